@@ -22,40 +22,26 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Sequence
 from itertools import product
 from math import ceil, isnan, nan
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.core.errors import MissingFileError
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies import benchmark_cases as given
-from dmp_cpg_ros.studies import late_walks, output, push_trials
+from dmp_cpg_ros.studies import benchmark_grounds as grounds
+from dmp_cpg_ros.studies import benchmark_pushes, late_walks, output, push_trials
 from dmp_cpg_ros.studies import walking_trials as trials
 from dmp_cpg_ros.studies.loop_recording import StopSummary, suite_of
 from dmp_cpg_ros.studies.study_stops import StopCase, run_trials
+from dmp_cpg_ros.studies.trial_tables import Table, by_cell, run, tell
+from dmp_cpg_ros.studies.walking_trials import is_there
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_gaits
-
-Cell = TypeVar('Cell')
-
-Results = list[tuple[dict[str, Any], Any]]
-"""Cases, as the arguments of their trials, with the outcomes."""
-
-@dataclass(frozen=True)
-class Table:
-    """A table and what it was made of."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    results: Results
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,38 +57,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _benchmark(options: argparse.Namespace, _: RosArguments) -> int:
-    results: dict[str, Any] = {}
     with Workers(options.workers, options.cluster) as workers:
-        for name in options.tables:
-            table = TABLES[name](workers, options.seeds, options.phases)
-            print(f'{table.title}\n\n{output.markdown_table(table.columns, table.rows)}\n',
-                  flush=True)
-            results[name] = [{'case': case, 'outcome': outcome} for case, outcome in table.results]
-    output.write_results(options.json, results)
+        tell(((name, TABLES[name](workers, options.seeds, options.phases))
+              for name in options.tables), options.json)
     return 0
-
-
-def _run(workers: Workers, trial: Callable[..., Any], cases: Sequence[dict[str, Any]]) -> Results:
-    """Cases with their outcomes."""
-    return list(zip(cases, workers.map(partial(_tried, trial), cases), strict=True))
-
-
-def _tried(trial: Callable[..., Any], case: dict[str, Any]) -> Any:
-    return trial(**case)
-
-
-def _by_cell(cells: Sequence[Cell], results: Results) -> Iterator[tuple[Cell, list[Any]]]:
-    """Every cell of a table with its outcomes, as many of each."""
-    count = len(results) // len(cells)
-    for k, cell in enumerate(cells):
-        yield cell, [outcome for _, outcome in results[k * count:(k + 1) * count]]
 
 
 def speeds(workers: Workers, seeds: int, phases: int) -> Table:
     """Steady velocities in all gaits."""
     walks = [*((gait, (v, 0.0, 0.0)) for gait, vs in given.STRAIGHT.items() for v in vs),
              *given.OTHERS]
-    results = _run(workers, trials.steady, [{'gait': gait, 'velocity': v} for gait, v in walks])
+    results = run(workers, trials.steady, [{'gait': gait, 'velocity': v} for gait, v in walks])
     rows = [(case['gait'], _velocity(case['velocity']), *steady_cells(case['velocity'], outcome))
             for case, outcome in results]
     return Table('Speeds; cost of transport with / without losses in the joints',
@@ -130,176 +95,16 @@ def _number(value: float, digits: int) -> str:
     return '-' if isnan(value) else f'{value:.{digits}f}'
 
 
-def pushes(workers: Workers, seeds: int, phases: int) -> Table:
-    """Largest pushes survived, the least and the median over the phases."""
-    cases = [{'gait': gait, 'speed': speed, 'phase': i / phases,
-              'directions': tuple(given.DIRECTIONS.values())}
-             for (gait, speed), i in product(given.PUSHED, range(phases))]
-    results = _run(workers, push_trials.survived_pushes, cases)
-    rows = [(f'{gait} {speed:g} m/s', *(
-        f'{low:.1f} / {middle:.1f}'
-        for low, middle in zip(np.min(of, axis=0), np.median(of, axis=0), strict=True)))
-        for (gait, speed), of in _by_cell(given.PUSHED, results)]
-    return Table(f'Pushes: speed change in m/s that is survived at every one of {phases} phases / '
-                 'at half of them; times the mass it is the impulse in N s',
-                 ('walking', *given.DIRECTIONS), rows,
-                 [(case, {'speed_change': of}) for case, of in results])
-
-
-def timing(workers: Workers, seeds: int, phases: int) -> Table:
-    """Falls by drawn pushes, without and with quicker steps; as many pushes as ``phases``."""
-    walks = [walk for walk in given.TIMED if 'robot' not in walk or _is_there(walk['robot'])]
-    results = _run(workers, push_trials.caught, [
-        {**walk, 'speed_change': change, 'case': case, 'quick': quick}
-        for walk in walks for quick in (False, True) for change in given.TIMED_CHANGES
-        for case in range(phases)])
-    fell = [sum(not upright for _, upright in results[k:k + phases])
-            for k in range(0, len(results), phases)]
-    count = len(given.TIMED_CHANGES)
-    rows = [(f'{walk["gait"]} {walk["speed"]:g} m/s', Path(walk.get('robot', 'its own')).stem,
-             walk.get('ground', 'flat'), *(
-                 f'{fell[2 * count * k + i]} / {fell[2 * count * k + count + i]}'
-                 for i in range(count))) for k, walk in enumerate(walks)]
-    return Table(f'Falls of {phases} drawn pushes without / with quicker steps',
-                 ('walking', 'robot', 'ground',
-                  *(f'{change:g} m/s' for change in given.TIMED_CHANGES)),
-                 rows, [(case, {'upright': upright}) for case, upright in results])
-
-
-def manoeuvres(workers: Workers, seeds: int, phases: int) -> Table:
-    """Falls by pushes at rest and in manoeuvres, without and with the steps that catch them."""
-    cells = [(name, change, drawn, recovery)
-             for name, changes, draws in given.PUSHED_IN for change, drawn, recovery in product(
-                 changes, draws, (False, True)) if recovery or name.startswith(given.STOPPED)]
-    results = _run(workers, push_trials.pushed, [
-        {'manoeuvre': name, 'speed_change': change, 'case': case, 'cases': phases, 'drawn': drawn,
-         'recovery': recovery} for name, change, drawn, recovery in cells
-        for case in range(phases)])
-    rows = []
-    for (name, change, drawn, recovery), of in _by_cell(cells, results):
-        rows.append((name, 'drawn' if drawn else 'all around', f'{change:g}',
-                     'on' if recovery else 'off', f'{sum(one.fell for one in of)}/{phases}',
-                     str(sum(one.rests for one in of)), str(max(one.releases for one in of))))
-    return Table('Pushes at rest and in manoeuvres: direction, duration and time are drawn, or '
-                 '0.1 s from all around',
-                 ('while', 'direction', 'm/s', 'push_recovery', 'fell', 'rests after 3 s',
-                  'most releases'), rows, results)
-
-
-def unpushed(workers: Workers, seeds: int, phases: int) -> Table:
-    """Releases by stops without a push; half as many seeds as ``phases`` on each ground."""
-    results = _run(workers, push_trials.unpushed, [
-        {'gait': gait, 'speed': low + (high - low) * seed / max(phases // 2 - 1, 1),
-         'seed': seed + 1, 'kind': kind, 'numbers': numbers, 'payload': payload}
-        for gait, (low, high), kind, numbers, payload in given.UNPUSHED
-        for seed in range(phases // 2)])
-    rows = []
-    for (gait, speeds_, kind, numbers, payload), of in _by_cell(given.UNPUSHED, results):
-        words = ', '.join((kind, *(f'{value:g}' for value in numbers.values()),
-                           *([f'payload {payload:g}'] if payload else [])))
-        rows.append((gait, '{:g} to {:g}'.format(*speeds_), words, str(len(of)),
-                     *(str(sum(bool(getattr(one, name)) for one in of))
-                       for name in ('releases', 'fell', 'rests'))))
-    return Table('Stops without a push', (
-        'gait', 'm/s', 'ground', 'stops', 'released', 'fell', 'rest after 3 s'), rows, results)
-
-
-def rough(workers: Workers, seeds: int, phases: int) -> Table:
-    """Share of the seeds that cross each ground."""
-    return _crossed('Rough ground', given.ROUGH, workers, seeds, 0)
-
-
-def rougher(workers: Workers, seeds: int, phases: int) -> Table:
-    """The same of harder grounds."""
-    return _crossed('Rougher ground', given.ROUGHER, workers, seeds, given.UNTUNED)
-
-
-def higher(workers: Workers, seeds: int, phases: int) -> Table:
-    """The same of grounds for longer legs, where that robot is there."""
-    there = given.HIGHER if _is_there(given.CLIMBER) else ()
-    return _crossed(f'Higher ground, {Path(given.CLIMBER).stem}', there, workers, seeds,
-                    given.UNTUNED, given.CLIMBER)
-
-
-def _crossed(title: str, grounds: Sequence[given.Ground], workers: Workers, seeds: int,
-             first: int, robot: str | None = None) -> Table:
-    results, rows = _crossings(
-        workers, seeds, product(grounds, given.ROUGH_GAITS, [()]), first, robot), []
-    for case, words, of, shares in _groups(results, seeds):
-        times = [outcome.time for outcome in of if outcome.crossed]
-        rows.append((case['kind'], words, case['gait'], *shares,
-                     f'{np.median(times):.1f}' if times else '-',
-                     f'{np.median([outcome.distance for outcome in of]):.1f}',
-                     str(sum(outcome.blocked for outcome in of))))
-    return Table(f'{title}, blind, at 0.5 m/s within a tenth', (
-        'ground', 'with', 'gait', 'seeds', 'crossed 5 m', 'fell', 'median time s',
-        'median way m', 'stopped as blocked'), rows, results)
-
-
-def obstacles(workers: Workers, seeds: int, phases: int) -> Table:
-    """What becomes of a robot that walks at a step that is too high."""
-    cells = list(product(given.OBSTACLES, given.ROUGH_GAITS, given.OBSTACLE_SPEEDS))
-    results = _run(workers, trials.obstacle, [
-        {'gait': gait, 'height': height, 'seed': seed, 'speed': speed}
-        for height, gait, speed in cells for seed in range(seeds)])
-    rows = []
-    for (height, gait, speed), of in _by_cell(cells, results):
-        times, ways = ([getattr(one, what) for one in of if one.stopped and not one.fell]
-                       for what in ('time', 'away'))
-        rows.append((f'{height:g}', f'{gait} {speed:g}', *(
-            f'{sum(getattr(one, what) for one in of)}/{seeds}'
-            for what in ('stopped', 'fell', 'over', 'rests')),
-            *((f'{max(times):.1f}', f'{min(ways):.2f}') if times else ('-', '-'))))
-    return Table('Steps that are too high', (
-        'height m', 'gait, m/s', 'stopped', 'fell', 'over', 'rests', 'stopped after s, worst',
-        'way back m, least'), rows, [(case, one._asdict()) for case, one in results])
-
-
-def contacts(workers: Workers, seeds: int, phases: int) -> Table:
-    """Crossings of rough ground with each of ``FEELING``."""
-    walks, rows = product(given.FELT_GROUNDS, given.ROUGH_GAITS, given.FEELING), []
-    results = _crossings(workers, seeds, walks)
-    for case, words, of, shares in _groups(results, seeds):
-        feels = given.FEELING[case['values']]
-        rows.append((f'{case["kind"]}, {words}', case['gait'], feels, *shares,
-                     f'{np.mean([outcome.distance for outcome in of]):.2f}',
-                     f'{np.mean([outcome.distance / outcome.time for outcome in of]):.3f}',
-                     f'{np.nanmean([outcome.tilt for outcome in of]):.2f}'))
-    return Table('Feeling the ground, blind, at 0.5 m/s within a tenth',
-                 ('ground', 'gait', 'feels', 'seeds', 'crossed 5 m', 'fell', 'mean distance m',
-                  'mean speed m/s', 'tilt rms deg'), rows, results)
-
-
-def _crossings(workers: Workers, seeds: int, walks: Iterator[tuple[Any, ...]],
-               first: int = 0, robot: str | None = None) -> Results:
-    """Crossings of ground, gait and parameters with every seed, the seeds innermost."""
-    return _run(workers, trials.cross, [
-        {'gait': gait, 'kind': kind, 'numbers': numbers, 'seed': seed, 'values': values,
-         'robot': robot}
-        for ((kind, numbers), gait, values), seed in product(walks, range(first, first + seeds))])
-
-
-def _groups(results: Results, seeds: int) -> Iterator[tuple[
-        dict[str, Any], str, list[trials.CrossingOutcome], tuple[str, str, str]]]:
-    """One case of all seeds, the ground's numbers in words, the outcomes, and how many crossed."""
-    for i in range(0, len(results), seeds):
-        case, of = results[i][0], [outcome for _, outcome in results[i:i + seeds]]
-        words = ', '.join(f'{name} {value:g}' for name, value in case['numbers'].items())
-        crossed, fell = (sum(getattr(outcome, what) for outcome in of)
-                         for what in ('crossed', 'fell'))
-        yield case, words, of, (str(seeds), output.percent(crossed, seeds), str(fell))
-
-
 def delays(workers: Workers, seeds: int, phases: int) -> Table:
     """Falls and speed by the delay of the targets, without a lead and with one that covers it."""
     cells = [(gait, speed, delay, lead)
              for (gait, speed), delay in product(given.LATE_WALKS, given.DELAYS_MS)
              for lead in sorted({0, 4 * ceil(delay[1] / 4)})]
-    results = _run(workers, late_walks.late, [
+    results = run(workers, late_walks.late, [
         {'gait': gait, 'speed': speed, 'delay_ms': delay, 'lead_ms': lead, 'seed': seed + 1}
         for gait, speed, delay, lead in cells for seed in range(seeds)])
     rows = []
-    for (gait, speed, delay, lead), of in _by_cell(cells, results):
+    for (gait, speed, delay, lead), of in by_cell(cells, results):
         upright = [one for one in of if not one.fell]
         means = ((f'{np.mean([one.reached for one in upright]):.2f}',
                   f'{np.mean([one.tilt for one in upright]):.2f}') if upright else ('-', '-'))
@@ -312,11 +117,11 @@ def delays(workers: Workers, seeds: int, phases: int) -> Table:
 def starved(workers: Workers, seeds: int, phases: int) -> Table:
     """Falls by how long and how often the controllers do not get to run."""
     cells = list(product(given.STARVED_WALKS, given.STARVED))
-    results = _run(workers, late_walks.starved, [
+    results = run(workers, late_walks.starved, [
         {'gait': gait, 'speed': speed, 'stalls': stalls, 'seed': seed + 1}
         for (gait, speed), stalls in cells for seed in range(seeds)])
     rows = []
-    for ((gait, speed), stalls), of in _by_cell(cells, results):
+    for ((gait, speed), stalls), of in by_cell(cells, results):
         rows.append((f'{gait} {speed:g}', str(stalls), f'{sum(one.fell for one in of)}/{seeds}',
                      f'{np.mean([one.stood for one in of]):.1f}'))
     return Table('Controllers that starve', (
@@ -326,12 +131,12 @@ def starved(workers: Workers, seeds: int, phases: int) -> Table:
 def mismatch(workers: Workers, seeds: int, phases: int) -> Table:
     """Falls and speeds of a robot that is not as its controllers know it."""
     cells = list(product(given.MISMATCHED, given.MISMATCHED_WALKS))
-    results = _run(workers, trials.steady, [
+    results = run(workers, trials.steady, [
         {'gait': gait, 'velocity': (speed, 0.0, 0.0), 'seed': seed + 1,
          'values': given.MISMATCHED[what](seed)}
         for what, (gait, speed) in cells for seed in range(seeds)])
     rows = []
-    for (what, (gait, speed)), of in _by_cell(cells, results):
+    for (what, (gait, speed)), of in by_cell(cells, results):
         errors = [100.0 * trials.relative_error(one, (speed, 0.0, 0.0))
                   for one in of if not one.fell]
         rows.append((what, f'{gait} {speed:g}', f'{seeds - len(errors)}/{seeds}', *(
@@ -343,7 +148,7 @@ def mismatch(workers: Workers, seeds: int, phases: int) -> Table:
 
 def gaits(workers: Workers, seeds: int, phases: int) -> Table:
     """Every ordered pair of gaits changed while moving, at a quarter of the phases."""
-    walks = _run(workers, trials.run_changes, [
+    walks = run(workers, trials.run_changes, [
         {'before': before, 'speed': speed, 'phases': max(1, phases // 4)}
         for before, speed in product(load_gaits(), trials.CHANGE_SPEEDS)])
     results = [(case, one) for case, of in walks for one in of]
@@ -366,11 +171,11 @@ def gaits(workers: Workers, seeds: int, phases: int) -> Table:
 def fast_gaits(workers: Workers, seeds: int, phases: int) -> Table:
     """Every ordered pair of gaits changed while all is asked for that may be."""
     cases: list[dict[str, Any]] = []
-    for file in filter(_is_there, given.ROBOTS):
+    for file in filter(is_there, given.ROBOTS):
         most = suite_of(robot=file).parameters.reference.max_speed
         cases += [{'before': before, 'speed': speed, 'phases': max(1, phases // 4), 'robot': file}
                   for before, speed in product(load_gaits(), (most, -most))]
-    walks = _run(workers, trials.run_changes, cases)
+    walks = run(workers, trials.run_changes, cases)
     results = [(case, one) for case, of in walks for one in of]
     rows = []
     for file in dict.fromkeys(str(case['robot']) for case in cases):
@@ -388,7 +193,7 @@ def fast_gaits(workers: Workers, seeds: int, phases: int) -> Table:
 
 def restarts(workers: Workers, seeds: int, phases: int) -> Table:
     """Posture control that begins anew in the middle of a stride."""
-    walks = _run(workers, trials.run_restarts, [
+    walks = run(workers, trials.run_restarts, [
         {'gait': gait, 'speed': speed, 'phases': phases} for gait, speed in given.RESTARTED])
     results = [(case, one) for case, of in walks for one in of]
     return Table('Posture control begins anew', (
@@ -445,8 +250,8 @@ def _top_speed(file: str) -> float:
 
 def robots(workers: Workers, seeds: int, phases: int) -> Table:
     """All robots that are there, with their files alone."""
-    results = _run(workers, run_robot, [
-        {'file': file, 'phases': phases} for file in given.ROBOTS if _is_there(file)])
+    results = run(workers, run_robot, [
+        {'file': file, 'phases': phases} for file in given.ROBOTS if is_there(file)])
     rows = []
     for case, of in results:
         amble, trot = (steady_cells((v, 0.0, 0.0), of[gait])
@@ -462,18 +267,10 @@ def robots(workers: Workers, seeds: int, phases: int) -> Table:
                  rows, results)
 
 
-def _is_there(file: str) -> bool:
-    try:
-        MujocoRobot(suite_of(robot=file).robot_file)
-    except MissingFileError:
-        return False
-    return True
-
-
 TABLES = {make.__name__: make for make in (
-    speeds, pushes, timing, manoeuvres, unpushed, rough, rougher, higher, obstacles, contacts,
-    delays, starved, mismatch, gaits, fast_gaits, restarts,
-    robots)}
+    speeds, benchmark_pushes.pushes, benchmark_pushes.timing, benchmark_pushes.manoeuvres,
+    benchmark_pushes.unpushed, grounds.rough, grounds.rougher, grounds.higher, grounds.obstacles,
+    grounds.contacts, delays, starved, mismatch, gaits, fast_gaits, restarts, robots)}
 """What can be measured."""
 
 

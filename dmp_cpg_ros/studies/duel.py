@@ -16,10 +16,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,6 +31,14 @@ from dmp_cpg_ros.studies.benchmark_cases import DIRECTIONS
 from dmp_cpg_ros.studies.benchmark_walking import steady_cells
 from dmp_cpg_ros.studies.learned_policy import PolicyFile, PolicyRun, load_policy
 from dmp_cpg_ros.studies.push_trials import largest_pushes
+from dmp_cpg_ros.studies.trial_tables import (
+    Results,
+    Table,
+    by_cell,
+    least_and_median,
+    run,
+    tell,
+)
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_gait
 
@@ -125,81 +132,67 @@ def standing(walker: Walker) -> dict[str, float]:
         'loaded': float((of.feet.force > loaded).all(axis=1).mean())}
 
 
-class Table(NamedTuple):
-    """Title, columns and rows of a table, and the cases with what became of them."""
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    results: list[tuple[dict[str, Any], Any]]
-
-
-Map = Callable[[Callable[..., Any], Sequence[dict[str, Any]]], list[Any]]
-
-
-def tracking_table(walkers: Sequence[Walker], phases: int, run: Map) -> Table:
+def tracking_table(walkers: Sequence[Walker], phases: int, workers: Workers) -> Table:
     """Velocities held, of each walker."""
     asked = list(product(VELOCITIES, walkers))
-    cases = [{'walker': walker, 'velocity': v} for v, walker in asked]
-    outcomes = run(tracking, cases)
-    cells = []
-    for (v, _), outcome in zip(asked, outcomes, strict=True):
-        reached, error, drift, cost = steady_cells(v, outcome)
-        cells.append(reached if outcome.fell else f'{error} %, {drift}°, {cost}')
-    rows = [(', '.join(f'{part:g}' for part in v),
-             *cells[k * len(walkers):(k + 1) * len(walkers)]) for k, v in enumerate(VELOCITIES)]
+    results = run(workers, tracking, [{'walker': walker, 'velocity': v} for v, walker in asked])
+    rows = []
+    for v, of in by_cell(VELOCITIES, results):
+        cells = []
+        for outcome in of:
+            reached, error, drift, cost = steady_cells(v, outcome)
+            cells.append(reached if outcome.fell else f'{error} %, {drift}°, {cost}')
+        rows.append((', '.join(f'{part:g}' for part in v), *cells))
     return Table('Velocities held: error of the speed, yaw drift per 10 m, cost of transport '
                  'with / without losses in the joints',
-                 ('m/s, m/s, rad/s', *(walker.name for walker in walkers)), rows,
-                 list(zip(cases, outcomes, strict=True)))
+                 ('m/s, m/s, rad/s', *(walker.name for walker in walkers)), rows, _named(results))
 
 
-def pushes_table(walkers: Sequence[Walker], phases: int, run: Map) -> Table:
+def pushes_table(walkers: Sequence[Walker], phases: int, workers: Workers) -> Table:
     """Pushes survived, of each walker."""
-    cases = [{'walker': walker, 'phase': k / phases}
-             for walker, k in product(walkers, range(phases))]
-    outcomes, rows = run(pushed, cases), []
-    for k, walker in enumerate(walkers):
-        of = np.array(outcomes[k * phases:(k + 1) * phases])
-        rows.append((walker.name, *(f'{low:.1f} / {middle:.1f}' for low, middle in zip(
-            of.min(axis=0), np.median(of, axis=0), strict=True))))
+    results = run(workers, pushed, [{'walker': walker, 'phase': k / phases}
+                                    for walker, k in product(walkers, range(phases))])
+    rows = [(walker.name, *least_and_median(of)) for walker, of in by_cell(walkers, results)]
     return Table(f'Pushes at {PUSHED_SPEED:g} m/s: speed change in m/s, up to {LARGEST_PUSH:g}, '
                  f'survived at every one of {phases} phases / at half of them',
                  ('', *DIRECTIONS), rows,
-                 [(case, {'speed_change': of}) for case, of in zip(cases, outcomes, strict=True)])
+                 [(case, {'speed_change': of}) for case, of in _named(results)])
 
 
-def stops_table(walkers: Sequence[Walker], phases: int, run: Map) -> Table:
+def stops_table(walkers: Sequence[Walker], phases: int, workers: Workers) -> Table:
     """Stops, of each walker."""
     cells = list(product(walkers, STOPPED_SPEEDS))
-    cases = [{'walker': walker, 'speed': speed, 'phase': k / phases}
-             for (walker, speed), k in product(cells, range(phases))]
-    outcomes, rows = run(stopped, cases), []
-    for k, (walker, speed) in enumerate(cells):
-        of = runs.StopSummary(outcomes[k * phases:(k + 1) * phases])
+    results, rows = run(workers, stopped, [
+        {'walker': walker, 'speed': speed, 'phase': k / phases}
+        for (walker, speed), k in product(cells, range(phases))]), []
+    for (walker, speed), outcomes in by_cell(cells, results):
+        of = runs.StopSummary(outcomes)
         rows.append((walker.name, f'{speed:g}', str(of.number('fell')), str(of.number('standing')),
-                     *(' / '.join(f'{scale * value:.{digits}f}' for value in of.spread(name))
-                       for name, scale, digits in (
+                     *(of.cell(name, scale, digits) for name, scale, digits in (
                            ('still_s', 1.0, 2), ('displacement_m', 1.0, 2), ('slip_m', 1e3, 1),
                            ('tilt', 180.0 / np.pi, 1), ('deceleration', 1.0, 1)))))
     return Table(f'Stops at {phases} phases, median / worst: time until the body stays below '
                  '2 cm/s with four feet loaded, way, slip of the feet, tilt, deceleration',
                  ('', 'm/s', 'fell', 'stood', 's', 'm', 'mm', 'deg', 'm/s^2'), rows,
-                 list(zip(cases, outcomes, strict=True)))
+                 _named(results))
 
 
-def standing_table(walkers: Sequence[Walker], phases: int, run: Map) -> Table:
+def standing_table(walkers: Sequence[Walker], phases: int, workers: Workers) -> Table:
     """Standing still, of the policy and of the suite, whose gaits stand alike."""
     of = [next(each for each in walkers if each.policy), next(
         each for each in walkers if not each.policy)]
-    cases = [{'walker': walker} for walker in of]
-    outcomes = run(standing, cases)
+    results = run(workers, standing, [{'walker': walker} for walker in of])
     rows = [('policy' if case['walker'].policy else 'suite', 'yes' if at['fell'] else 'no',
              f'{1e3 * at["way"]:.1f}', f'{1e3 * at["speed"]:.1f}', f'{at["torque"]:.2f}',
-             f'{100.0 * at["loaded"]:.0f} %') for case, at in zip(cases, outcomes, strict=True)]
+             f'{100.0 * at["loaded"]:.0f} %') for case, at in results]
     return Table(f'Standing for {STANDING:g} s without a command',
                  ('', 'fell', 'moved mm', 'speed rms mm/s', 'torque rms N m', 'four feet loaded'),
-                 rows, list(zip(cases, outcomes, strict=True)))
+                 rows, _named(results))
+
+
+def _named(results: Results) -> Results:
+    """Results with walkers by their names."""
+    return [({**case, 'walker': case['walker'].name}, outcome) for case, outcome in results]
 
 
 TABLES = {'tracking': tracking_table, 'pushes': pushes_table, 'stops': stops_table,
@@ -232,23 +225,10 @@ def _duel(options: argparse.Namespace, _: RosArguments) -> int:
         Walker(load_gait(gait).name, options.robot, None, options.braking)
         for gait in options.gaits)]
     PolicyRun(policy, options.robot).walk(0.1)  # what does not fit is said at once
-    results: dict[str, Any] = {}
     with Workers(options.workers, options.cluster) as workers:
-        def run(trial: Callable[..., Any], cases: Sequence[dict[str, Any]]) -> list[Any]:
-            return list(workers.map(partial(_tried, trial), cases))
-
-        for name in options.tables:
-            table = TABLES[name](walkers, options.phases, run)
-            print(f'{table.title}\n\n{output.markdown_table(table.columns, table.rows)}\n',
-                  flush=True)
-            results[name] = [{'case': {**case, 'walker': case['walker'].name}, 'outcome': outcome}
-                             for case, outcome in table.results]
-    output.write_results(options.json, results)
+        tell(((name, TABLES[name](walkers, options.phases, workers)) for name in options.tables),
+             options.json)
     return 0
-
-
-def _tried(trial: Callable[..., Any], case: dict[str, Any]) -> Any:
-    return trial(**case)
 
 
 if __name__ == '__main__':

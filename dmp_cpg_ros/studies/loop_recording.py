@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import ceil
+from math import ceil, isnan
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -334,3 +334,8 @@ class StopSummary:
                            if not outcome.fell])
         values = values[np.isfinite(values)]
         return (float(np.median(values)), float(values.max())) if values.size else (np.nan, np.nan)
+
+    def cell(self, name: str, scale: float, digits: int) -> str:
+        """Median and worst of a number in another unit, as a cell."""
+        of = self.spread(name)
+        return '-' if isnan(of[0]) else ' / '.join(f'{scale * one:.{digits}f}' for one in of)

@@ -24,7 +24,7 @@ from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby, product
-from math import cos, isnan, pi, sin
+from math import cos, pi, sin
 from pathlib import Path
 from typing import Any
 
@@ -355,9 +355,7 @@ def _cells(outcomes: Sequence[StopOutcome], method: str) -> tuple[str, ...]:
     fell, stood, walked_on, bounded, exceeded = map(of.number, (
         'fell', 'standing', 'walked_on', 'bounded', 'bound_exceeded'))
     prediction_error, *others = (
-        '-' if isnan(of.spread(name)[0])
-        else ' / '.join(f'{scale * value:.{digits}f}' for value in of.spread(name))
-        for name, scale, digits in (
+        of.cell(name, scale, digits) for name, scale, digits in (
             ('prediction_error', 100.0, 1), ('bound_s', 1.0, 2), ('measured_s', 1.0, 2),
             ('body_rest_s', 1.0, 2), ('still_s', 1.0, 2), ('slip_m', 1e3, 1),
             ('displacement_m', 1.0, 2),

@@ -19,6 +19,7 @@ import numpy as np
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.metrics.robot import cost_of_transport, cost_without_losses
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw, tilt
+from dmp_cpg_ros.core.errors import MissingFileError
 from dmp_cpg_ros.core.estimation.estimator import estimated_state
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.loop import Array, WalkingLoop
@@ -121,6 +122,15 @@ class SteadyOutcome:
     yaw_drift: float = nan
     cost_of_transport: float = nan
     without_losses: float = nan
+
+
+def is_there(file: str) -> bool:
+    """Whether a robot's file and its model are installed."""
+    try:
+        MujocoRobot(suite_of(robot=file).robot_file)
+    except MissingFileError:
+        return False
+    return True
 
 
 def steady(gait: str, velocity: Velocity, robot: str | None = None, seed: int = 0,
