@@ -22,6 +22,7 @@ from dmp_cpg_ros.studies import adversary_networks, delays
 from dmp_cpg_ros.studies.adversary_runs import Batch, Setting
 from dmp_cpg_ros.studies.adversary_stops import suite_case
 from dmp_cpg_ros.studies.adversary_suite import Oscillators
+from dmp_cpg_ros.studies.delayed_runs import PATTERNS, fails
 from dmp_cpg_ros.studies.draws import Case, Judged, log_uniform
 
 
@@ -159,7 +160,7 @@ _TIMES = {'late': (1.2, 1.6), 'held': (8.0, 60.0), 'carried': (1.0, 20.0)}
 
 def draw_delay(rng: np.random.Generator, weaken: bool, kind: str) -> Case:
     """A kind of delay: of what a few legs bear, most of all for states held."""
-    patterns = ['one age', 'kept'] if kind == 'late' else list(delays.PATTERNS)
+    patterns = ['one age', 'kept'] if kind == 'late' else list(PATTERNS)
     return {'size': int(rng.integers(2, 5)), 'seed': int(rng.integers(1 << 30)),
             'pattern': str(rng.choice(['chosen'] if kind == 'held' and weaken else patterns)),
             'times': log_uniform(rng, *_TIMES[kind]) if weaken else float(rng.uniform(0.3, 0.999))}
@@ -175,6 +176,6 @@ def judge_delay(_: RobotDescription, case: Case, weaken: bool, kind: str) -> Jud
     if not certified > 2e-4 or weaken and certified > (0.02 if kind == 'held' else 0.1):
         return None
     age = min(certified, 0.1) * case['times']
-    failed = delays.fails(capture, kind, np.array([age]), case['pattern'], rng)[0]
+    failed = fails(capture, kind, np.array([age]), case['pattern'], rng)[0]
     return (f'fails with samples of {age:.3g} s, {case["pattern"]}' if failed else ''), (
         case['times'])

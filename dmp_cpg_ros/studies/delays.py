@@ -20,7 +20,6 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
@@ -30,12 +29,10 @@ from dmp_cpg_ros.core.contraction import delays
 from dmp_cpg_ros.core.contraction.capture import capture_set, place_tolerance, radius_tolerance
 from dmp_cpg_ros.core.contraction.delays import Capture
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
-from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.paper.carried_slowly import slowly_carried_margin
+from dmp_cpg_ros.studies.delayed_runs import PATTERNS, fails
 from dmp_cpg_ros.studies.draws import both_ways, random_edges
 from dmp_cpg_ros.studies.output import markdown_table
-
-Complex = NDArray[np.complex128]
 
 MARGINS: dict[str, Callable[[Capture], float]] = {
     'late': delays.late_margin, 'held': delays.held_margin, 'carried': delays.carried_margin,
@@ -43,16 +40,12 @@ MARGINS: dict[str, Callable[[Capture], float]] = {
 """Kinds of delay, and what is certified: ``carried`` for an ω that may jump, ``steady`` for one
 that stands still."""
 
-PATTERNS = ('one age', 'edges', 'kept', 'kept from inhibited', 'chosen')
-"""How ages are distributed and vary."""
-
 AGES = 0.999 * 1.2 ** np.arange(-1, 15)
 """Ages that are tried, in units of the certified one."""
 
 COLUMNS = ('delay', 'networks', 'none certified', 'nothing fails', 'share of what fails: least',
            'median', 'most')
 
-_CHOICES = 12  # ages of which one is chosen
 _BETWEEN = 8  # ages from the last that works to the first that fails
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
@@ -177,118 +170,6 @@ def failing_age(capture: Capture, kind: str, certified: float, rng: np.random.Ge
     between = np.geomspace(ages[first - 1], ages[first], _BETWEEN)[1:-1]
     also = np.any([fails(capture, kind, between, pattern, rng) for pattern in worst], axis=0)
     return float(between[also.argmax()] if also.any() else ages[first])
-
-
-def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random.Generator
-          ) -> NDArray[np.bool_]:
-    """Whether C is left or rest is not reached, for all ages at once.
-
-    Locked coordinates as complex numbers that turn anticlockwise; the pull of coupling and
-    inhibition is integrated exactly for samples that are held for one small step.
-    """
-    k, held, r0, r = capture.coupling, capture.held, capture.region_radius, capture.radius
-    count, size, omega = len(ages), len(k), capture.omega
-    rho = float(capture.system.rho.max())
-    step = min(float(ages[0]) / 10.0, 0.1 / omega, 0.1 / float(k.sum(axis=1).max()))
-    most = np.maximum(0, np.floor(ages / step).astype(int) - 1)  # a sample is held for a step
-    rest = 8.0 * float(ages[-1]) + 6.0 / max(capture.undelayed.rate, 1.0)
-    steps = int(rest / step)
-    fastest = np.zeros((4, count))
-    length = int(most.max()) + 2
-    start = -2.0 * np.arcsin(min(1.0, r0 / (2.0 * r))) - 0.5 * step * omega
-    before = omega / (1.0 + k.sum(axis=1).max() * ages * (kind == 'held'))
-    turn = np.exp(1j * step * np.arange(1 - length, 1)[:, None] * before)[:, :, None]
-    apart = rng.uniform(-0.5, 0.5, (count, size)) * capture.places / r
-    apart[:, held] = 0.0
-    past = r * np.exp(1j * (start + apart)) * turn
-    rates = 1j * before[:, None] * past
-    backwards = np.full(count, -length)
-    z, now = past[-1], length - 1
-    edges, each = rng.random((size, size)), rng.random((count, size, size))
-    shares = {'one age': np.ones((size, size)), 'edges': edges}.get(pattern, each)
-    age = (shares * most[:, None, None]).astype(int)
-    acted, bad, aside = np.zeros((3, count), dtype=bool)
-    row, column = np.arange(count)[:, None, None], np.arange(size)[None, None, :]
-    carried = kind in ('carried', 'steady')
-    late, kept, seen_age = kind == 'late', pattern[:4] in ('kept', 'chos'), most
-
-    def field(z: Complex) -> Complex:
-        """ż without any pull."""
-        return np.asarray((rho * (r * r - np.abs(z) ** 2) + 1j * omega) * z)
-
-    for tick in range(steps):
-        if pattern == 'chosen' and acted.any():
-            age = chosen_ages(z - r, past, rates * carried, now, most, step, age)
-        elif kept:
-            age = np.where(age >= most[:, None, None], 0, age + 1)
-            seen_age = np.where(seen_age >= most, 0, seen_age + 1)
-            if pattern == 'kept from inhibited':
-                age[:, :, ~held] = 0
-        index = (now - (0 if late else 1) * age) % length
-        samples = past[index, row, column]
-        if carried:
-            samples = samples + rates[index, row, column] * (age * step)
-        judged = past[(now - seen_age) % length, np.arange(count)] if late else z
-        acts = np.all(np.abs(judged[:, held] - r) <= r0, axis=1)
-        entered = acts & ~acted
-        backwards[np.any((rates[now] * np.conj(z)).imag < 0.0, axis=1)] = tick
-        aside |= entered & (tick - backwards <= most)
-        acted |= acts
-        bad |= acted & (np.any(np.abs(z[:, held] - r) > r0 * (1.0 + 1e-9), axis=1) | ~acts)
-        gains = np.where(acts[:, None], capture.gains, 0.0)
-        decay = k.sum(axis=1) + gains
-        pulled = np.einsum('ij,bij->bi', k, samples) + gains * r
-        faded = np.exp(-decay * step)
-        feed = np.divide(1.0 - faded, decay, out=np.full_like(decay, step), where=decay > 0.0)
-        bad |= ~np.all(np.abs(z) < 1e3, axis=1)
-        z = np.where(np.abs(z) < 1e3, z, 0.0)
-        ahead = faded * z + feed * (field(z) + pulled)
-        z = faded * z + 0.5 * feed * (field(z) + field(ahead) + 2.0 * pulled)
-        now = (now + 1) % length
-        past[now], rates[now] = z, field(z) + pulled - decay * z
-        quarter = fastest[4 * tick // steps]
-        np.maximum(quarter, np.abs(rates[now]).max(axis=1), out=quarter)
-    moves = (fastest[3] > 0.9 * fastest[1]) & (fastest[3] > 1e-3 * omega * r)
-    return (bad | ~acted | moves) & ~aside
-
-
-def chosen_ages(away: Complex, past: Complex, rates: Complex, now: int, most: NDArray[np.int_],
-                step: float, age: NDArray[np.int_]) -> NDArray[np.int_]:
-    """Ages of the samples that pull each node farthest away from the target now, of those that do
-    not come before the last that it had, (count, N, N).
-
-    Parameters
-    ----------
-    away : ndarray (count, N)
-        From the target to the nodes.
-    past, rates : ndarray (length, count, N)
-        States by tick, a ring, and what carries them on [1/s].
-    now : int
-        Where the present is in it.
-    most : ndarray (count,)
-        Largest ages in ticks.
-    step : float
-        Length of a tick [s].
-    age : ndarray (count, N, N)
-        Ages at the last tick.
-    """
-    length, count, row = len(past), len(away), np.arange(len(away))[:, None]
-    age = age + 1
-    shares = np.minimum(np.linspace(0.0, 1.0, _CHOICES), 1.0)
-    ages = np.round(shares * most[:, None]).astype(int)                    # (count, choices)
-    at = (now - ages) % length
-    seen = past[at, row] + rates[at, row] * (ages * step)[:, :, None]       # (count, choices, N)
-    out = away / np.maximum(np.abs(away), 1e-12)
-    worth = np.einsum('bi,bcj->bcij', out.real, seen.real) + np.einsum(
-        'bi,bcj->bcij', out.imag, seen.imag)
-    worth[ages[:, :, None, None] > age[:, None]] = -np.inf
-    cell = row[:, :, None], np.arange(age.shape[2])
-    old = past[(now - age) % length, cell[0], cell[1]] + rates[
-        (now - age) % length, cell[0], cell[1]] * (age * step)
-    kept = np.where(age > most[:, None, None], -np.inf, (np.conj(out)[:, :, None] * old).real)
-    best = worth.argmax(axis=1)
-    better = np.take_along_axis(worth, best[:, None], axis=1)[:, 0] > kept
-    return np.where(better, ages[np.arange(count)[:, None, None], best], age)
 
 
 if __name__ == '__main__':

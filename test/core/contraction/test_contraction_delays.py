@@ -12,13 +12,8 @@ import pytest
 from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.contraction.delays import Capture, carried_margin, longest_carried
 from dmp_cpg_ros.paper.carried_slowly import Undelayed, slowly_carried_margin
-from dmp_cpg_ros.studies.delays import (
-    MARGINS,
-    PATTERNS,
-    capture_of,
-    fails,
-    random_captures,
-)
+from dmp_cpg_ros.studies.delayed_runs import PATTERNS, fails
+from dmp_cpg_ros.studies.delays import MARGINS, capture_of, random_captures
 
 
 def captured(graph: str = 'all_to_all', k: float = 100.0, omega: float = 12.2,
