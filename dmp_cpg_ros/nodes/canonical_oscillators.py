@@ -31,6 +31,7 @@ from dmp_cpg_ros.core.suite_parameters import CANONICAL, CertificateParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.core.voting.parameters import VotingParameters
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
+from dmp_cpg_ros.nodes.framework.gait_memory import GaitMemory
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
 from dmp_cpg_ros.nodes.framework.known_stop import KnownStop
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
@@ -77,7 +78,7 @@ class CanonicalOscillators(SuiteNode):
         self.match('reference', {'reference': conversions.read_reference, **contacts},
                    delayed={'inhibition_gains': stamped(conversions.InhibitionGainsReader().read)},
                    optional=contacts)
-        self._memory = self.remembered(gaits)
+        self._memory = GaitMemory(self, gaits)
 
     def activate(self) -> None:
         """Tell late joiners what acts."""
@@ -96,7 +97,7 @@ class CanonicalOscillators(SuiteNode):
         """Advance the oscillators to the stamp of the reference."""
         dt, r = self.elapsed, values['reference']
         force = told_at(stamp_ns, values.get('foot_contacts'), np.full(len(LEGS), np.nan))
-        if known := self._memory(stamp_ns):
+        if known := self._memory.take(stamp_ns):
             dt, (x, x_dot, gait, _) = known
             self._state = replace(self._state, x=x, x_dot=x_dot, gait=gait,
                                   cadence_scale=gait.cadence_scale)

@@ -16,6 +16,7 @@ from dmp_cpg_ros.core.gait.running import approached
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import REFERENCE
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified
+from dmp_cpg_ros.nodes.framework.gait_memory import GaitMemory
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, ReferenceWriter
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
@@ -42,7 +43,7 @@ class ReferenceFilter(SuiteNode):
         gains = InhibitionGainsReader()
         self.match('joint_states', {'joint_states': lambda _: None},
                    delayed={'inhibition_gains': stamped(gains.read)})
-        self._memory = self.remembered(self.certified.gaits)
+        self._memory = GaitMemory(self, self.certified.gaits)
         self._gate = self.certified.commands()
 
     def on_parameters(self) -> None:
@@ -53,7 +54,7 @@ class ReferenceFilter(SuiteNode):
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the filter to the stamp of the robot's state."""
         dt, wanted = self.elapsed, self.parameters_of(CanonicalParameters).cadence_scale
-        if known := self._memory(stamp_ns):
+        if known := self._memory.take(stamp_ns):
             dt, (*_, self._r) = known
         self._cadence = approached(self._cadence, wanted, dt)
         command, gains = self._gate.at(stamp_ns), values['inhibition_gains']

@@ -146,7 +146,7 @@ class ParameterFollower:
         told = self._plain(owner, dict(zip(names, answer.values, strict=True)))
         if owner in self._claimed:
             self._ask_owner(owner)
-        if not self._node.follow(told) and any(
+        if not self._node.parameter_changes.follow(told) and any(
                 told[name] != value for name, value in claimed.items()):
             self._node.drop('/parameter_events', DataError(
                 f'{dict(claimed)} is said to be changed by {owner}, which has not'),
@@ -212,13 +212,13 @@ class Certified:
     def certificate(self) -> Certificate:
         """Certificate of the parameters that were accepted last."""
         if self._held is None:
-            self._held = self._running(self._node.accepted).settled.certificate()
+            self._held = self._running(self._accepted).settled.certificate()
         return self._held
 
     @property
     def contact(self) -> ContactLimits | None:
         """What contact feedback may do; None where it is off."""
-        on = self._node.accepted[CanonicalParameters].contact_feedback
+        on = self._accepted[CanonicalParameters].contact_feedback
         return self.certificate.contact if on else None
 
     def certificate_in(self, gait: GaitInForce) -> Certificate:
@@ -226,7 +226,7 @@ class Certified:
         running = self.running_in(gait)
         if running.moving:
             return running.certificate()
-        if running.gait.name == self._node.accepted[suite.GaitParameters].gait:
+        if running.gait.name == self._accepted[suite.GaitParameters].gait:
             return self.certificate
         if gait.name not in self._held_in:
             self._held_in[gait.name] = running.certificate()
@@ -234,11 +234,11 @@ class Certified:
 
     def running_in(self, gait: GaitInForce) -> gate.Running:
         """What runs in a gait in force, or in a change between two."""
-        if gait.name == self._node.accepted[suite.GaitParameters].gait:
-            return self._running(self._node.accepted)
+        if gait.name == self._accepted[suite.GaitParameters].gait:
+            return self._running(self._accepted)
         ends = (gait.transition.before, gait.transition.after) if isinstance(
             gait, BlendedGait) else (gait,)
-        return self._running(self._node.accepted, [end.name for end in ends])
+        return self._running(self._accepted, [end.name for end in ends])
 
     def report(self) -> None:
         """Say on ``/diagnostics`` whether the accepted parameters are certified."""
@@ -262,6 +262,10 @@ class Certified:
             self._acting().cadence if self._node.configured else None)
 
     # Changes -----------------------------------------------------------------------------------
+
+    @property
+    def _accepted(self) -> Sets:
+        return self._node.parameter_changes.accepted
 
     def check(self, sets: Sets) -> None:
         """Refuse what would lose the certificate, or what nobody can walk with.
@@ -297,7 +301,7 @@ class Certified:
         where it will be, and :meth:`check` asks whether it still lies in what was judged.
         """
         if self._held is None and self._node.configured:
-            present = self._running(self._node.accepted).settled
+            present = self._running(self._accepted).settled
             return present.certificate, partial(self._learn, present)
         asked = self._asked(sets)
         if asked is None or self._waits(asked[1]) or (
@@ -317,15 +321,15 @@ class Certified:
         node = self._node
         if not node.configured:
             return None
-        changed = node.changed_values(sets)
+        changed = node.parameter_changes.between(sets)
         gaits = self._changing_gaits(sets)
         if not changed or gate.UNCERTIFIED.issuperset(changed):
             return None
         proposed = self._running(sets)
-        if node.following:
+        if node.parameter_changes.following:
             return None
         return changed, gate.Change(
-            self._running(node.accepted), self.certificate, proposed, gaits)
+            self._running(self._accepted), self.certificate, proposed, gaits)
 
     def _waits(self, change: gate.Change) -> str:
         """Why the change has to wait; empty when it has not."""
@@ -352,8 +356,8 @@ class Certified:
         """
         walked, named = self._acting().gaits, self.gaits.named
         name, choice = sets[suite.GaitParameters].gait, sets[GaitChoiceParameters]
-        asked = name != self._node.accepted[suite.GaitParameters].gait
-        chosen = choice.auto_gait and choice != self._node.accepted[GaitChoiceParameters]
+        asked = name != self._accepted[suite.GaitParameters].gait
+        chosen = choice.auto_gait and choice != self._accepted[GaitChoiceParameters]
         if not walked or not (asked or chosen):
             return ()
         if asked:
@@ -371,15 +375,15 @@ class Certified:
         if self._verdict is not None:
             self._held = self._verdict.settled
             self.report()
-        elif self._node.following:
+        elif self._node.parameter_changes.following:
             needed, self._held = self._held is not None, None
             if self._watches or (needed and not self._node.lock_step):
-                running = self._running(self._node.accepted).settled
+                running = self._running(self._accepted).settled
                 self._node.beside_ticks(running.certificate, partial(self._learn, running))
 
     def _learn(self, running: gate.Running, certificate: Certificate) -> None:
         """Take the certificate of what was accepted, unless that is something else by now."""
-        if running == self._running(self._node.accepted).settled:
+        if running == self._running(self._accepted).settled:
             self._held = certificate
             if self._watches:
                 self.report()

@@ -40,4 +40,4 @@ def gait_name(node: SuiteNode) -> str:
 def follow_gait(node: SuiteNode, gait: GaitInForce) -> None:
     """Let a node's parameter ``gait`` name the gait that its messages say, once it has changed."""
     if gait.name != gait_name(node) and not isinstance(gait, BlendedGait):
-        node.follow({'gait': gait.name})
+        node.parameter_changes.follow({'gait': gait.name})

@@ -9,7 +9,6 @@ node overrides the hooks that it needs: ``configure``, ``activate``, ``deactivat
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, ClassVar, TypeVar, cast
@@ -21,20 +20,18 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from dmp_cpg_ros.core.clock import TickClock
-from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
-from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
-from dmp_cpg_ros.core.parameters import Parameters, typed
-from dmp_cpg_ros.core.suite_parameters import OWNER
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.nodes.framework import parameters
 from dmp_cpg_ros.nodes.framework.certified import Certified, Sets
+from dmp_cpg_ros.nodes.framework.changes import ParameterChanges
 from dmp_cpg_ros.nodes.framework.health import missing_connections
-from dmp_cpg_ros.nodes.framework.judging import Compute, InTurn, Step, Use, judge
+from dmp_cpg_ros.nodes.framework.judging import Compute, Use, judge
 from dmp_cpg_ros.nodes.framework.lifecycle import GuardedLifecycleNode
 from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery, SuitePublisher
 from dmp_cpg_ros.nodes.framework.ticks import TickInputs, drain
 from dmp_cpg_ros.nodes.framework.writers import TopicWriters
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
-from dmp_cpg_ros.nodes.messages.conversions import GaitMemoryReader
 from dmp_cpg_ros.nodes.messages.interfaces import (
     PUBLISHER_DEPTH,
     REPEATED,
@@ -52,13 +49,6 @@ WATCH_EVERY_S = 0.5
 LOOK_AFTER_S = 0.02
 """How often a node looks after inputs that do not wake it, in case the one that does is late [s].
 """
-
-FRESH_NS = 20_000_000
-"""Age up to which a memory of the gait is where a restarted node goes on [ns]: within it the robot
-has not moved, which waits in lock-step."""
-
-MOST_VERDICTS = 8
-"""How often a change is judged anew because what runs has become another meanwhile."""
 
 P = TypeVar('P', bound=Parameters)
 Readers = Mapping[str, Callable[[Any], Any]]
@@ -85,13 +75,12 @@ class SuiteNode(GuardedLifecycleNode):
         default those of its kind in the table of nodes, and ``lock_step``.
     CHANGEABLE : collection of str
         Parameters that may change while the node runs; all others are read-only. Those that
-        another node owns are refused with its name, and change only by :meth:`follow`.
+        another node owns are refused with its name, and change only by
+        :meth:`~dmp_cpg_ros.nodes.framework.changes.ParameterChanges.follow`.
     certified : Certified, optional
         What judges changes, of a node that makes it in ``configure``.
-    accepted : mapping from class to instance
-        Parameters that were accepted last; they take effect at the next tick.
-    following : bool
-        Whether the change that is judged is one that its owner has accepted.
+    parameter_changes : ParameterChanges
+        What is done with changes, and the parameters that were accepted last.
     inputs : TickInputs
         Of :meth:`match`.
     writers : TopicWriters
@@ -108,20 +97,15 @@ class SuiteNode(GuardedLifecycleNode):
     certified: Certified | None = None
     local: LocalDelivery | None = None
     inputs: TickInputs
-    following = False
     elapsed = 0.0
 
     def __init__(self, name: str | None = None, **options: Any) -> None:
         """Create the node and check its parameters; raises ParameterError for a bad one."""
         super().__init__(name or self.KIND, **options)
-        self._table = self.parameter_table()
-        self.accepted: Sets = parameters.declare(self, self._table)
-        self._sets: Sets = self.accepted
-        self.add_on_set_parameters_callback(self._check_change)
-        self.add_post_set_parameters_callback(self._accept_change)
+        self.parameter_changes = ParameterChanges(self)
+        self._sets: Sets = self.parameter_changes.accepted
         self._undo: list[Callable[[], object]] = []
         self._said: list[Callable[[], None]] = []
-        self._changes_in_turn = InTurn(self.beside_ticks)
         self._commands: list[Subscription] = []
         self._not_waking: dict[str, Subscription] = {}
         self._commands_taken: dict[str, int] = {}
@@ -197,29 +181,6 @@ class SuiteNode(GuardedLifecycleNode):
         if self.parameters_of(parameters.NodeParameters).autostart:
             super().start()
 
-    def follow(self, values: Mapping[str, Any]) -> bool:
-        """Take over what the owner of some parameters has accepted; returns whether it is new.
-
-        Raises
-        ------
-        DataError
-            If it cannot be taken over; nothing is then changed.
-        """
-        known = self._table.values(self.accepted)
-        news = {name: value for name, value in values.items()
-                if name in known and value != parameters.plain(known[name])}
-        if not news:
-            return False
-        self.following = True
-        try:
-            result = self.set_parameters_atomically(
-                [Parameter(name, value=value) for name, value in news.items()])
-        finally:
-            self.following = False
-        if not result.successful:
-            raise DataError(f'cannot follow {news}: {result.reason}')
-        return True
-
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set parameters; read-only ones may be set to the value that they have.
 
@@ -234,69 +195,15 @@ class SuiteNode(GuardedLifecycleNode):
         return super().set_parameters_atomically(news)
 
     def change(self, make: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
-        """Change parameters when what the certificate says of it has been found beside the ticks;
-        changes take their turn.
-        """
-        return self._changes_in_turn.take(self._changing(make, request, response), response)
+        """Change parameters when what the certificate says of it has been found."""
+        return self.parameter_changes.take(make, request, response)
 
-    def _changing(self, make: Callable[[Any, Any], Any], request: Any, response: Any
-                  ) -> Iterator[Step]:
-        make = self.guarded('set_parameters', make)
-        entries, one_by_one = list(request.parameters), hasattr(response, 'results')
-        for group in [[entry] for entry in entries] if one_by_one else [entries]:
-            for _ in range(MOST_VERDICTS):
-                asked = self._to_judge(group)
-                if asked is None:
-                    break
-                yield asked
-            made = make(type(request)(parameters=group), type(response)())
-            if one_by_one:
-                response.results.extend(made.results)
-            else:
-                response.result = made.result
-
-    def _to_judge(self, entries: Sequence[Any]) -> Step | None:
-        """What has to be computed before a change can be judged at once."""
-        if self.certified is None or self.lock_step:
-            return None
-        try:
-            sets = self._changed([Parameter.from_parameter_msg(entry) for entry in entries])
-            return self.certified.to_judge(sets)
-        except Exception:  # noqa: BLE001 - whatever it is, the change itself will say so
-            return None
-
-    def changed_values(self, sets: Sets) -> dict[str, Any]:
-        """New values of the parameters in which sets differ from those accepted last."""
-        before = self._table.values(self.accepted)
-        return {name: value for name, value in self._table.values(sets).items()
-                if value != before[name]}
-
-    def _check_change(self, changes: list[Parameter]) -> SetParametersResult:
-        """Validate changes together with the values that were accepted last."""
-        try:
-            sets = self._changed(changes)
-            for name, value in self.changed_values(sets).items() if not self.following else ():
-                owner = OWNER.get(name, self.KIND)
-                if owner != self.KIND:
-                    raise ParameterError(
-                        f"'{name}' belongs to {owner}, which the other nodes follow; set it "
-                        f'there: ros2 param set /{owner} {name} {typed(value)}')
-            self.check_parameters(sets)
-        except DmpCpgError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
-
-    def _accept_change(self, changes: list[Parameter]) -> None:
-        self.accepted = self._changed(changes)
+    def take_over(self) -> None:
+        """Use what has been accepted: at once before anything runs, else from the next tick on."""
         if not self.configured:
-            self._sets = self.accepted
+            self._sets = self.parameter_changes.accepted
         elif self.certified is not None:
             self.certified.accept()
-
-    def _changed(self, changes: list[Parameter]) -> dict[type[Parameters], Parameters]:
-        return self._table.build({**self._table.values(self.accepted), **{
-            change.name: parameters.plain(change.value) for change in changes
-            if change.name in self._table.fields}})
 
     # Topics and services -----------------------------------------------------------------------
 
@@ -414,6 +321,11 @@ class SuiteNode(GuardedLifecycleNode):
         served = self.create_service(service.type, service.name, answer)
         self._undo.append(partial(self.destroy_service, served))
 
+    def leave(self, subscription: Subscription) -> None:
+        """Destroy a subscription that nobody needs any more."""
+        self._inputs = [entry for entry in self._inputs if entry[1] is not subscription]
+        self.destroy_subscription(subscription)
+
     def destroy_entities(self) -> None:
         """Destroy the publishers, subscriptions and services of :meth:`configure`."""
         if self.certified is not None:
@@ -493,41 +405,14 @@ class SuiteNode(GuardedLifecycleNode):
         if self._not_waking:
             self.look_every(LOOK_AFTER_S)
 
-    def remembered(self, gaits: KnownGaits) -> Callable[[int], tuple[float, Any] | None]:
-        """Listen for what the node held before it was restarted, as others remember it.
-
-        Returns
-        -------
-        callable (stamp_ns)
-            At the first tick: the time since the memory [s] and what it says, if it is of the
-            tick or of one shortly before; None at all others.
-        """
-        reader: GaitMemoryReader | None = GaitMemoryReader(gaits)
-        kept: deque[Any] = deque(maxlen=1)
-        heard = self.listen('gait_memory', kept.append)
-
-        def take(stamp_ns: int) -> tuple[float, Any] | None:
-            nonlocal reader
-            if reader is None:
-                return None
-            said = [(stamp_ns - header_ns(message), reader.read(message))
-                    for message in kept]
-            reader = None
-            if heard is not None:  # nobody needs it any more
-                self._inputs = [entry for entry in self._inputs if entry[1] is not heard]
-                self.destroy_subscription(heard)
-            return next(((1e-9 * age, what) for age, what in said if 0 <= age <= FRESH_NS), None)
-
-        return take
-
     def begin_tick(self, stamp_ns: int) -> None:
         """Start a tick: waiting commands are taken and changed parameters take effect."""
         self.health.ticks += 1
         self.health.stamp_ns = stamp_ns
         for subscription in self._commands:
             drain(subscription)
-        if self.accepted is not self._sets:
-            self._sets = self.accepted
+        if self.parameter_changes.accepted is not self._sets:
+            self._sets = self.parameter_changes.accepted
             self.on_parameters()
 
     def end_tick(self) -> None:

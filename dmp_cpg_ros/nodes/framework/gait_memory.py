@@ -1,0 +1,50 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where a restarted node was in the gait, as others remember it."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
+from dmp_cpg_ros.nodes.messages.conversions import GaitMemoryReader
+from dmp_cpg_ros.nodes.messages.values import header_ns
+
+if TYPE_CHECKING:
+    from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+
+FRESH_NS = 20_000_000
+"""Age up to which a memory of the gait is where a restarted node goes on [ns]: within it the robot
+has not moved, which waits in lock-step."""
+
+
+class GaitMemory:
+    """Listens for what a node held before it was restarted, until its first tick.
+
+    Parameters
+    ----------
+    node : SuiteNode
+        Who listens.
+    gaits : KnownGaits
+        Gaits that are known.
+    """
+
+    def __init__(self, node: SuiteNode, gaits: KnownGaits) -> None:
+        self._node, self._reader = node, GaitMemoryReader(gaits)
+        self._kept: deque[Any] = deque(maxlen=1)
+        self._heard = node.listen('gait_memory', self._kept.append)
+        self._asked = False
+
+    def take(self, stamp_ns: int) -> tuple[float, Any] | None:
+        """At the first tick: the time since the memory [s] and what it says, if it is of the
+        tick or of one shortly before; None at all others.
+        """
+        if self._asked:
+            return None
+        self._asked = True
+        said = [(stamp_ns - header_ns(message), self._reader.read(message))
+                for message in self._kept]
+        if self._heard is not None:
+            self._node.leave(self._heard)
+        return next(((1e-9 * age, what) for age, what in said if 0 <= age <= FRESH_NS), None)
