@@ -7,9 +7,7 @@
 (paper eqs. hetero, inhibitedCanonicalSystem). The four oscillators of a gait have their own,
 faster step in :mod:`~dmp_cpg_ros.core.canonical.system`, which is exact in the linear part.
 
-The cost of a coupling grows with the number of edges, or with the number of nodes. Those of phase
-oscillators, Σ_j k_ij sin(φ_j + φ_ij − φ_i) (Kuramoto 1984), are what couplings of states amount to
-along the unit circle.
+The cost of a coupling grows with the number of edges, or with the number of nodes.
 
 The time steps here are explicit ones that many cheap stages make stable: nothing is stored,
 factorised or solved. Both are of order two, keep every equilibrium of the field, and evaluate it
@@ -142,39 +140,6 @@ class MeanFieldCoupling:
         z = np.ascontiguousarray(x).view(complex)[:, 0]
         rate = (self._gain * np.vdot(self._turn, z)) * self._turn - self.bound * z
         return rate.view(float).reshape(x.shape)
-
-
-class _OnTheCircle:
-    """Sine coupling: a coupling of states along the unit circle."""
-
-    state_size = 1
-
-    def __init__(self, of: EdgeCoupling | MeanFieldCoupling, bound: float) -> None:
-        self._of, self.bound = of, bound
-        self.count, self.symmetric, self.turned = of.count, of.symmetric, of.turned
-
-    def __call__(self, x: Array) -> Array:
-        """Rates, ndarray (N, 1) → (N, 1) [rad/s]."""
-        z = np.exp(-1j * x[:, 0])
-        rate = self._of(z.view(float).reshape(-1, 2)).view(complex)[:, 0]
-        return -(z.conj() * rate).imag[:, None]
-
-
-class PhaseEdgeCoupling(_OnTheCircle):
-    """Sine coupling over the edges of a CouplingGraph; ParameterError unless its K = k I."""
-
-    def __init__(self, graph: CouplingGraph) -> None:
-        if not np.array_equal(graph.gains, graph.gains[:, :1, :1] * np.eye(2)):
-            raise ParameterError('phase oscillators need gains K = k I')
-        super().__init__(of := EdgeCoupling(graph), of.bound)
-
-
-class PhaseMeanFieldCoupling(_OnTheCircle):
-    """All-to-all sine coupling with one gain; parameters as of MeanFieldCoupling."""
-
-    def __init__(self, count: int, gain: float, phases: ArrayLike | None = None) -> None:
-        # of Σ k sin(θ_j − θ_i) the Jacobian's norm is at most twice the largest row sum
-        super().__init__(of := MeanFieldCoupling(count, gain, phases), 2.0 * of.bound)
 
 
 class OscillatorNetwork:

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Families of oscillators for networks: Andronov-Hopf, Van der Pol, phase oscillators, mixed."""
+"""Families of oscillators for networks: Andronov-Hopf, Van der Pol, mixed."""
 
 from __future__ import annotations
 
@@ -142,43 +142,6 @@ class VanDerPolOscillators:
     def stiffness(self, x: Array) -> float:
         """Largest Frobenius norm of the Jacobians [1/s]."""
         return float(np.linalg.norm(self.jacobian(x), axis=(1, 2)).max())
-
-
-class PhaseOscillators:
-    """N oscillators φ̇ = ω whose state is their phase [rad], ndarray (N, 1): what is left of Hopf
-    oscillators when ρ grows without bound.
-
-    Parameters
-    ----------
-    count : int
-        Number N.
-    omega : array_like
-        Angular frequencies, one for all or (N,) [rad/s].
-
-    Raises
-    ------
-    ParameterError
-        If ω is not finite or of another length.
-    """
-
-    state_size = 1
-    rotation_invariant = True
-
-    def __init__(self, count: int, omega: ArrayLike) -> None:
-        self.count = count
-        self.omega = _one_per_oscillator('omega', omega, count, -np.inf)
-
-    def field(self, x: Array) -> Array:
-        """Rates, ndarray (N, 1), whatever the phases."""
-        return self.omega[:, None]
-
-    def jacobian(self, x: Array) -> Array:
-        """Zeros, ndarray (N, 1, 1)."""
-        return np.zeros((self.count, 1, 1))
-
-    def stiffness(self, x: Array) -> float:
-        """Zero: a phase neither attracts nor repels."""
-        return 0.0
 
 
 class MixedOscillators:

@@ -16,18 +16,14 @@ from dmp_cpg_ros.core.canonical.phase import phase, state_at, wrapped
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.paper.network import (
-    Coupling,
     EdgeCoupling,
     MeanFieldCoupling,
     OscillatorNetwork,
-    PhaseEdgeCoupling,
-    PhaseMeanFieldCoupling,
 )
 from dmp_cpg_ros.paper.oscillators import (
     HopfOscillators,
     MixedOscillators,
     OscillatorFamily,
-    PhaseOscillators,
     VanDerPolOscillators,
 )
 
@@ -42,7 +38,7 @@ def families(count: int) -> dict[str, OscillatorFamily]:
     rho, radius = rng.uniform(1.0, 9.0, count), rng.uniform(0.5, 2.0, count)
     hopf = HopfOscillators(count, omega, rho, radius)
     van_der_pol = VanDerPolOscillators(count, omega, rng.uniform(0.1, 3.0, count))
-    return {'hopf': hopf, 'van_der_pol': van_der_pol, 'phase': PhaseOscillators(count, omega),
+    return {'hopf': hopf, 'van_der_pol': van_der_pol,
             'mixed': MixedOscillators([hopf, van_der_pol])}
 
 
@@ -52,7 +48,7 @@ def every_edge(name: str, size: int, gain: float | np.ndarray, seed: int,
     return EdgeCoupling(graph_from_edges(size, topology(name, size), gain, phases))
 
 
-@pytest.mark.parametrize('kind', ['hopf', 'van_der_pol', 'phase', 'mixed'])
+@pytest.mark.parametrize('kind', ['hopf', 'van_der_pol', 'mixed'])
 @given(seed=st.integers(0, 1000), count=st.integers(1, 5))
 @settings(max_examples=20)
 def test_jacobians_against_differences_and_within_their_bound(
@@ -105,24 +101,6 @@ def test_the_mean_field_is_the_sum_over_all_edges(seed: int, size: int, gain: fl
     phases, x = rng.uniform(-3.0, 3.0, size), rng.normal(size=(size, 2))
     graph = graph_from_edges(size, topology('all_to_all', size), gain, phases)
     assert np.allclose(MeanFieldCoupling(size, gain, phases)(x), EdgeCoupling(graph)(x))
-    angles = rng.normal(size=(size, 1))
-    assert np.allclose(PhaseMeanFieldCoupling(size, gain, phases)(angles),
-                       PhaseEdgeCoupling(graph)(angles))
-
-
-@given(seed=st.integers(0, 1000), size=st.integers(2, 6))
-def test_phase_coupling_is_the_sum_of_sines(seed: int, size: int) -> None:
-    rng = np.random.default_rng(seed)
-    phases, x = rng.uniform(-3.0, 3.0, size), rng.uniform(-3.0, 3.0, (size, 1))
-    graph = graph_from_edges(size, topology('star', size), 3.0, phases)
-    expected = np.zeros(size)
-    for i, j in graph.edges:
-        expected[i] += 3.0 * np.sin(x[j, 0] + phases[i] - phases[j] - x[i, 0])
-    of = PhaseEdgeCoupling(graph)
-    assert np.allclose(of(x)[:, 0], expected)
-    jacobian = differences(lambda at: of(at[:, None])[:, 0], x[:, 0])
-    assert np.linalg.norm(jacobian, 2) <= of.bound + 1e-6
-    assert np.allclose(jacobian, jacobian.T, atol=1e-7)
 
 
 def run(of: OscillatorNetwork, x: np.ndarray, seconds: float, dt: float = 0.004,
@@ -155,28 +133,6 @@ def test_equal_oscillators_lock_at_their_offsets(name: str) -> None:
     x = run(OscillatorNetwork(HopfOscillators(6, 5.0), coupling), RNG.normal(size=(6, 2)), 3.0)
     places = wrapped(phase(x) - phases)
     assert np.abs(wrapped(places - places[0])).max() < 1e-3
-
-
-@pytest.mark.parametrize('mean_field', [False, True])
-def test_phase_oscillators_lock_at_their_offsets(mean_field: bool) -> None:
-    phases = np.array([0.0, 1.0, -2.0, 0.5, 2.5])
-    graph = graph_from_edges(5, topology('all_to_all', 5), 4.0, phases)
-    coupling: Coupling = (PhaseMeanFieldCoupling(5, 4.0, phases) if mean_field
-                          else PhaseEdgeCoupling(graph))
-    x = run(OscillatorNetwork(PhaseOscillators(5, 3.0), coupling), RNG.normal(size=(5, 1)), 3.0)
-    places = wrapped(x[:, 0] - phases)
-    assert np.abs(wrapped(places - places[0])).max() < 1e-6
-
-
-def test_hopf_oscillators_of_strong_attraction_are_phase_oscillators() -> None:
-    omega, graph = np.array([4.0, 5.0, 6.0, 5.5]), graph_from_edges(4, topology('ring', 4), 2.0)
-    angles = np.array([0.0, 1.0, -0.5, 2.0])
-    hopf = OscillatorNetwork(HopfOscillators(4, omega, 2000.0), EdgeCoupling(graph))
-    plain = OscillatorNetwork(PhaseOscillators(4, omega), PhaseEdgeCoupling(graph))
-    x, phi = state_at(angles), angles[:, None]
-    for _ in range(500):
-        x, phi = hopf.step(x, 0.002), plain.step(phi, 0.002)
-    assert np.abs(wrapped(phase(x) - phi[:, 0])).max() < 0.01
 
 
 def crossings(x: np.ndarray, dt: float) -> np.ndarray:
@@ -229,12 +185,10 @@ def test_a_mixed_network_runs_with_one_period() -> None:
     lambda: HopfOscillators(3, 1.0, rho=0.0),
     lambda: HopfOscillators(3, np.nan),
     lambda: VanDerPolOscillators(2, 0.0, 1.0),
-    lambda: MixedOscillators([HopfOscillators(2, 1.0), PhaseOscillators(2, 1.0)]),
+    lambda: MixedOscillators([]),
     lambda: MeanFieldCoupling(3, 0.0),
     lambda: MeanFieldCoupling(3, 1.0, [0.0, 1.0]),
-    lambda: PhaseEdgeCoupling(graph_from_edges(2, ((0, 1),), SKEWED)),
     lambda: OscillatorNetwork(HopfOscillators(3, 1.0), MeanFieldCoupling(4, 1.0)),
-    lambda: OscillatorNetwork(PhaseOscillators(3, 1.0), MeanFieldCoupling(3, 1.0)),
     lambda: OscillatorNetwork(HopfOscillators(3, 1.0), target=np.zeros(2)),
     lambda: OscillatorNetwork(VanDerPolOscillators(2, 1.0, 1.0),
                               MeanFieldCoupling(2, 1.0, [0.0, 1.0])),
