@@ -19,7 +19,7 @@ pytest.importorskip('mujoco')
 
 import numpy as np
 import ros_processes
-from ros_processes import SHARED_HZ, NodeProcess, Processes, Ros
+from ros_processes import RUN_S, SHARED_HZ, NodeProcess, Processes, Ros
 from std_srvs.srv import SetBool
 
 from dmp_cpg_ros.analysis.loading import load_recording
@@ -32,9 +32,6 @@ from dmp_cpg_ros.suite_table import PROCESSES, ROBOT
 processes, ros, ros_domain = (
     ros_processes.processes, ros_processes.ros, ros_processes.ros_domain)
 
-RUN_S = 300.0
-"""How long a run may take on a loaded machine before the test gives up [s]."""
-
 HUNG_S = 3.0
 """How long ``walk`` waits for a node that hangs [s], instead of the usual 10 and 15."""
 
@@ -46,30 +43,16 @@ RESTS_S = 2.0
 """How long a robot rests, of its own time, after its nodes are ready again [s]."""
 
 
-def scenario(folder: Path, duration_s: float, events: Sequence[Mapping[str, Any]] = ()) -> str:
+def scenario(folder: Path, duration_s: float, events: Sequence[Mapping[str, Any]] = ()) -> Path:
     file = folder / 'kills.yaml'
     file.write_text(json.dumps({'name': 'kills', 'duration': duration_s, 'events': [
         {'at': 0.3, 'command': {'v_x': 0.4}}, *events]}), encoding='utf-8')
-    return str(file)
+    return file
 
 
 def walk(processes: Processes, folder: Path, duration_s: float, *arguments: str,
          events: Sequence[Mapping[str, Any]] = ()) -> NodeProcess:
-    return processes.executable('walk', scenario(folder, duration_s, events), '--no-report',
-                                '--out', str(folder / 'run'), *arguments)
-
-
-def send(process: NodeProcess, node: str, number: int) -> None:
-    """Send a signal to a node of a walk, or to the process that it shares."""
-    for path in Path('/proc').glob('[0-9]*/cmdline'):
-        try:
-            words = path.read_text(encoding='utf-8').split('\0')
-        except OSError:
-            continue
-        if str(process.pid) in words and {node, f'__node:={node}'} & set(words):
-            os.kill(int(path.parent.name), number)
-            return
-    pytest.fail(f'{node} does not run:\n{process.output}')
+    return processes.walk(scenario(folder, duration_s, events), folder / 'run', *arguments)
 
 
 def assert_undisturbed(run: Path) -> None:
@@ -87,7 +70,7 @@ def test_in_lock_step_the_walk_goes_on_as_if_nobody_had_died(
     process.wait_for_output(r's +walking', RUN_S)
     dead = ('inhibition', 'canonical_oscillators', 'leg_transformation_fl')
     for node in dead:
-        send(process, node, signal.SIGKILL)
+        os.kill(process.pid_of(node), signal.SIGKILL)
         process.wait_for_output(rf'{node} was ended by signal 9 \(SIGKILL\)', RUN_S)
     process.wait_for_output(AGAIN, RUN_S)
     assert process.wait(RUN_S) == 0, str(process)
@@ -100,7 +83,7 @@ def test_in_lock_step_the_walk_goes_on_after_the_death_of_each_block(
     process.wait_for_output(r's +walking', RUN_S)
     blocks = [name for name in PROCESSES['blocks'] if name != ROBOT]
     for count, name in enumerate(blocks, 1):
-        send(process, PROCESSES['blocks'][name][0], signal.SIGKILL)
+        os.kill(process.pid_of(PROCESSES['blocks'][name][0]), signal.SIGKILL)
         process.wait_for_output(rf'{name} was ended by signal 9 \(SIGKILL\)', RUN_S)
         process.wait_for_output(rf'(?s)({AGAIN}.*){{{count}}}', RUN_S)
     assert process.wait(RUN_S) == 0, str(process)
@@ -129,7 +112,7 @@ def test_a_stop_of_the_service_outlives_inhibition_and_oscillators(
     process.wait_for_output(r'(?s)> inhibit.*s +at rest', RUN_S)
     dead = ('gait', 'supervision') if 'blocks' in way else (CANONICAL, INHIBITION)
     for node in (CANONICAL, INHIBITION):
-        send(process, node, signal.SIGKILL)
+        os.kill(process.pid_of(node), signal.SIGKILL)
     for name in dead:
         process.wait_for_output(rf'{name} was ended by signal 9 \(SIGKILL\)', RUN_S)
     process.wait_for_output(AGAIN, RUN_S)
@@ -148,7 +131,7 @@ def test_without_respawn_the_robot_comes_to_a_stand_and_walk_names_who_died(
         processes: Processes, tmp_path: Path, node: str) -> None:
     process = walk(processes, tmp_path, 60.0, '--rate', str(SHARED_HZ))
     process.wait_for_output(r's +walking', RUN_S)
-    send(process, node, signal.SIGKILL)
+    os.kill(process.pid_of(node), signal.SIGKILL)
     assert process.wait(RUN_S) == 1, str(process)
     assert re.search(rf'walk: {node} was ended by signal 9 \(SIGKILL\)', process.output)
     odometry = load_recording(tmp_path / 'run').odometry
@@ -164,10 +147,10 @@ def test_a_node_that_hangs_is_named_and_the_run_has_failed(
         f'suite_run.LAST_WORDS_S = suite_run.ENDED_WITHIN_S = {HUNG_S}\n'
         'from dmp_cpg_ros.__main__ import walk\n'
         'sys.exit(walk())\n')
-    process = processes.python('-c', program, scenario(tmp_path, 2.0), '--no-report', '--out',
+    process = processes.python('-c', program, str(scenario(tmp_path, 2.0)), '--no-report', '--out',
                                str(tmp_path / 'run'), '--composed', '--rate', str(SHARED_HZ))
     process.wait_for_output(r's +walking', RUN_S)
-    send(process, 'bag_recorder', signal.SIGSTOP)
+    os.kill(process.pid_of('bag_recorder'), signal.SIGSTOP)
     assert process.wait(RUN_S) == 1, str(process)
     # and whoever has not ended either, on a loaded machine
     assert re.search(r'walk: bag_recorder(, \w+)* hung', process.output), process

@@ -20,7 +20,7 @@ pytest.importorskip('rclpy')
 
 import rclpy
 import ros_processes
-from ros_processes import SHARED_HZ, NodeProcess, Processes, Ros, wait_until
+from ros_processes import RUN_S, SHARED_HZ, NodeProcess, Processes, Ros, wait_until
 
 from dmp_cpg_ros.analysis.bag import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
@@ -37,9 +37,6 @@ events:
   - {{at: 0.1, inhibit: false}}
   - {{at: 0.1, command: {{v_x: 0.4}}}}
 """
-
-RUN_S = 240.0
-"""How long a run may take on a loaded machine before the test gives up [s]."""
 
 
 def scenario(folder: Path, duration_s: float) -> str:

@@ -17,15 +17,14 @@ pytest.importorskip('rclpy')
 
 import ros_processes
 from core_examples import network, quadruped, standing_state
+from plain_run import plain_run
 from ros_processes import Processes, Ros
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.analysis.loading import load_recording
-from dmp_cpg_ros.commands.walk import load_scenario, main
+from dmp_cpg_ros.commands.walk import main
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.loop import Tick, WalkingLoop
-from dmp_cpg_ros.core.scenario.scenario import play
 from dmp_cpg_ros.core.voting.votes import VoteInbox
 from dmp_cpg_ros.nodes.framework.ticks import HOLD_TICKS
 from dmp_cpg_ros.nodes.inhibition import HEARTBEAT_NS
@@ -33,9 +32,6 @@ from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter, read_votes
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.robot_state import RobotStateWriter
 from dmp_cpg_ros.nodes.messages.values import stamp_ns
-from dmp_cpg_ros.robot.model_reader import load_description
-from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
-from dmp_cpg_ros.suite import load_suite
 
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
 
@@ -55,34 +51,11 @@ events:
 """
 """Synchronised legs of which none alone can stop the others; three are certified to."""
 
-RUN_S = 240.0
-
-
-def plain_run(scenario_file: Path) -> list[Tick]:
-    """Run the scenario on the plain loop."""
-    scenario = load_scenario(scenario_file)
-    suite = load_suite(overrides=scenario.parameters)
-    robot = PerfectTrackingRobot(load_description(suite.robot_file), suite.tick_ns)
-    loop = WalkingLoop(robot.description, suite.gait, suite.parameters)
-    state, ticks = robot.reset(), []
-
-    def step() -> None:
-        nonlocal state
-        ticks.append(loop.tick(state))
-        state = robot.step(ticks[-1].targets)
-
-    play(scenario, suite.tick_ns, step, loop.takers)
-    return ticks
-
 
 def test_one_vote_does_not_stop_the_nodes_and_three_do(
         processes: Processes, tmp_path: Path) -> None:
-    scenario, out = tmp_path / 'votes.yaml', tmp_path / 'run'
-    scenario.write_text(SCENARIO, encoding='utf-8')
-    process = processes.executable('walk', str(scenario), '--lock-step',
-                                   '--composed', '--no-report', '--out', str(out))
-    assert process.wait(RUN_S) == 0, str(process)
-    recording, ticks = load_recording(out / 'bag'), plain_run(scenario)
+    run = processes.walked(SCENARIO, tmp_path / 'run', '--lock-step', '--composed')
+    recording, (_, ticks) = load_recording(run / 'bag'), plain_run(tmp_path / 'run.yaml')
     np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
     np.testing.assert_array_equal(
         recording.targets.position, [tick.targets.position for tick in ticks])

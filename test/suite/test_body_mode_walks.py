@@ -7,7 +7,6 @@ nobody.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,15 +14,10 @@ import pytest
 pytest.importorskip('rclpy')
 
 import ros_processes
-from ros_processes import NodeProcess, Processes
+from plain_run import plain_run
+from ros_processes import RUN_S, Processes
 
 from dmp_cpg_ros.analysis.loading import load_recording
-from dmp_cpg_ros.commands.walk import load_scenario
-from dmp_cpg_ros.core.loop import WalkingLoop
-from dmp_cpg_ros.core.robot_model.state import RobotState
-from dmp_cpg_ros.core.scenario.scenario import play
-from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.suite import load_suite
 
 processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 
@@ -55,42 +49,15 @@ events:
   - {at: 0.1, command: {v_x: 0.3}}
 """
 
-RUN_S = 240.0
-"""How long a run may take on a loaded machine before the test gives up [s]."""
-
-
-def start(processes: Processes, text: str, folder: Path, *options: str) -> NodeProcess:
-    scenario = folder / 'scenario.yaml'
-    scenario.write_text(text, encoding='utf-8')
-    return processes.executable('walk', str(scenario), '--no-report',
-                                '--out', str(folder / 'run'), *options)
-
-
-def plain_run(scenario_file: Path) -> tuple[list[RobotState], list[Any]]:
-    """Run the scenario on the plain loop; states and ticks."""
-    scenario = load_scenario(scenario_file)
-    suite = load_suite(None, scenario.parameters)
-    robot = MujocoRobot(suite.robot_file, suite.tick_ns, sensors=suite.sensors,
-                        start_pose=suite.robot.start_pose)
-    loop = WalkingLoop(robot.description, suite.gait, suite.parameters)
-    states, ticks = [robot.reset()], []
-
-    def step() -> None:
-        ticks.append(loop.tick(states[-1]))
-        states.append(robot.step(ticks[-1].targets))
-
-    play(scenario, suite.tick_ns, step, {**loop.takers, **robot.takers})
-    return states, ticks
-
-
 def test_services_act_at_their_ticks_and_nodes_agree_with_the_plain_loop_bit_for_bit(
     processes: Processes, tmp_path: Path
 ) -> None:
-    process = start(processes, UP_AND_DOWN, tmp_path, '--lock-step', '--processes', 'blocks')
+    process = processes.walk(
+        UP_AND_DOWN, tmp_path / 'run', '--lock-step', '--processes', 'blocks')
     assert process.wait(RUN_S) == 0, str(process)
     assert 'lie_down: lying' in process.output
     recording = load_recording(tmp_path / 'run' / 'bag')
-    states, ticks = plain_run(tmp_path / 'scenario.yaml')
+    states, ticks = plain_run(tmp_path / 'run.yaml')
     np.testing.assert_array_equal(
         recording.joints.position, [state.joint_position for state in states[:-1]])
     np.testing.assert_array_equal(
@@ -107,7 +74,7 @@ def test_services_act_at_their_ticks_and_nodes_agree_with_the_plain_loop_bit_for
 def test_the_gait_does_not_start_while_the_robot_lies_and_the_reason_is_said(
     processes: Processes, tmp_path: Path
 ) -> None:
-    process = start(processes, TOO_EARLY, tmp_path, '--lock-step', '--composed')
+    process = processes.walk(TOO_EARLY, tmp_path / 'run', '--lock-step', '--composed')
     assert process.wait(RUN_S) == 1
     assert 'the gait cannot start: the robot is lying, not standing; call stand_up' in (
         process.output)
@@ -116,7 +83,7 @@ def test_the_gait_does_not_start_while_the_robot_lies_and_the_reason_is_said(
 def test_ctrl_c_lays_a_live_robot_down_after_the_recording(
     processes: Processes, tmp_path: Path
 ) -> None:
-    process = start(processes, WALKING, tmp_path, '--composed')
+    process = processes.walk(WALKING, tmp_path / 'run', '--composed')
     process.wait_for_output('walking', RUN_S)
     process.interrupt()
     assert process.wait(RUN_S) == 130, str(process)

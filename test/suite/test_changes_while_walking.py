@@ -15,17 +15,12 @@ pytest.importorskip('rclpy')
 
 import ros_processes
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from plain_run import plain_run
 from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter, parameter_value_to_python
-from ros_processes import SHARED_HZ, Processes, Ros
+from ros_processes import RUN_S, SHARED_HZ, Processes, Ros
 
 from dmp_cpg_ros.analysis.loading import load_recording
-from dmp_cpg_ros.commands.walk import load_scenario
-from dmp_cpg_ros.core.loop import WalkingLoop
-from dmp_cpg_ros.core.scenario.scenario import play
-from dmp_cpg_ros.robot.model_reader import load_description
-from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
-from dmp_cpg_ros.suite import load_suite
 
 processes, ros, ros_domain = (
     ros_processes.processes, ros_processes.ros, ros_processes.ros_domain)
@@ -59,14 +54,13 @@ events:
 def test_the_robot_walks_on_when_a_change_is_refused_and_when_it_is_accepted(
     processes: Processes, tmp_path: Path, leg: str, shared: str
 ) -> None:
-    asked, plain = tmp_path / 'asked.yaml', tmp_path / 'plain.yaml'
-    asked.write_text(SCENARIO.format(refused=REFUSED, leg=leg), encoding='utf-8')
+    plain = tmp_path / 'plain.yaml'
     plain.write_text(SCENARIO.format(refused='', leg=leg), encoding='utf-8')
     settings = [item for name, value in OVERRIDES.items()
                 for item in ('--set', f'{name}:={value}')]
-    process = processes.executable('walk', str(asked), '--lock-step', shared, '--no-report',
-                                   '--out', str(tmp_path / 'run'), *settings)
-    assert process.wait(240.0) == 0, str(process)
+    process = processes.walk(SCENARIO.format(refused=REFUSED, leg=leg), tmp_path / 'run',
+                             '--lock-step', shared, *settings)
+    assert process.wait(RUN_S) == 0, str(process)
     said = process.output
     refusals = re.findall(r'refused: (.*)', said)
     assert len(refusals) == 4, said
@@ -83,29 +77,14 @@ def test_the_robot_walks_on_when_a_change_is_refused_and_when_it_is_accepted(
         for pattern in words:
             assert re.search(pattern, refusal), refusal
 
-    recording, ticks = load_recording(tmp_path / 'run' / 'bag'), plain_ticks(plain)
+    recording, (_, ticks) = load_recording(tmp_path / 'run' / 'bag'), plain_run(
+        plain, **OVERRIDES)
     assert ticks[-1].supervisor.state == 'at_rest'
     np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
     np.testing.assert_array_equal(recording.canonical.x_dot, [tick.x_dot for tick in ticks])
     for name in ('position', 'velocity', 'effort'):
         np.testing.assert_array_equal(
             getattr(recording.targets, name), [getattr(tick.targets, name) for tick in ticks])
-
-
-def plain_ticks(scenario_file: Path) -> list[Any]:
-    """The scenario on the plain loop."""
-    scenario, suite = load_scenario(scenario_file), load_suite(None, OVERRIDES)
-    robot = PerfectTrackingRobot(load_description(suite.robot_file), suite.tick_ns)
-    loop, ticks = WalkingLoop(robot.description, suite.gait, suite.parameters), []
-    state = robot.reset()
-
-    def step() -> None:
-        nonlocal state
-        ticks.append(loop.tick(state))
-        state = robot.step(ticks[-1].targets)
-
-    play(scenario, suite.tick_ns, step, loop.takers)
-    return ticks
 
 
 def set_parameters(ros: Ros, node: str, **values: Any) -> Any:

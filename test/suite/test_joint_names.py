@@ -86,14 +86,9 @@ def test_names_that_cannot_be_are_refused(tmp_path: Path, changes: dict[str, Any
 
 
 def test_a_run_with_other_names_is_the_same_run(processes: Processes, tmp_path: Path) -> None:
-    scenario = tmp_path / 'scenario.yaml'
-    scenario.write_text(SCENARIO, encoding='utf-8')
     file = robot_file(tmp_path, UNITREE)
     for out, options in (('usual', []), ('named', ['--robot', str(file)])):
-        walk = processes.executable(
-            'walk', str(scenario), '--lock-step', '--composed', '--no-report', '--out',
-            str(tmp_path / out), *options)
-        assert walk.wait(240.0) == 0, str(walk)
+        processes.walked(SCENARIO, tmp_path / out, '--lock-step', '--composed', *options)
     usual, named = (load_recording(tmp_path / out) for out in ('usual', 'named'))
     assert len(named.joints.time) > 250
     for series in ('joints', 'targets'):

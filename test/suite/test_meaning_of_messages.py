@@ -50,14 +50,9 @@ def test_nothing_that_walks_reads_what_is_written_for_people() -> None:
 
 def test_no_text_of_a_run_in_lock_step_carries_a_number_that_controls(
         processes: Processes, tmp_path: Path) -> None:
-    scenario = tmp_path / 'scenario.yaml'
-    scenario.write_text(SCENARIO, encoding='utf-8')
-    walk = processes.executable(
-        'walk', str(scenario), '--lock-step', '--composed', '--no-report', '--out',
-        str(tmp_path / 'run'))
-    assert walk.wait(240.0) == 0, str(walk)
+    run = processes.walked(SCENARIO, tmp_path / 'run', '--lock-step', '--composed')
     texts: dict[str, set[tuple[str, ...]]] = defaultdict(set)
-    with AnyReader([tmp_path / 'run' / 'bag']) as reader:
+    with AnyReader([run / 'bag']) as reader:
         for connection, _, raw in reader.messages():
             message = reader.deserialize(raw, connection.msgtype)
             frame = getattr(getattr(message, 'header', None), 'frame_id', '')

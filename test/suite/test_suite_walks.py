@@ -10,7 +10,6 @@ import os
 import re
 import signal
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,17 +19,11 @@ from dmp_cpg_ros.core.gait.known_gaits import shares_of
 pytest.importorskip('rclpy')
 
 import ros_processes
-from ros_processes import SHARED_HZ, NodeProcess, Processes, reserved_domain
+from plain_run import plain_run
+from ros_processes import RUN_S, SHARED_HZ, Processes, reserved_domain
 
 from dmp_cpg_ros.analysis.bag import opened, payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
-from dmp_cpg_ros.commands.walk import load_scenario
-from dmp_cpg_ros.core.loop import WalkingLoop
-from dmp_cpg_ros.core.robot_model.state import RobotState
-from dmp_cpg_ros.core.scenario.scenario import play
-from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.robot.watchdog import CommandWatchdog
-from dmp_cpg_ros.suite import load_gaits, load_suite
 
 processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 
@@ -83,54 +76,11 @@ WITH_CONTACTS = {'contact_feedback': True}
 
 TICK_NS = 4_000_000
 
-RUN_S = 240.0
-"""How long a run may take on a loaded machine before the test gives up [s]."""
-
-
 @pytest.fixture(scope='module')
 def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp('scenario') / 'short.yaml'
     path.write_text(SCENARIO, encoding='utf-8')
     return path
-
-
-def start_walk(processes: Processes, scenario: Path, out: Path, *options: str) -> NodeProcess:
-    return processes.executable(
-        'walk',
-        str(scenario),
-        '--no-report',
-        '--out',
-        str(out),
-        *options,
-    )
-
-
-def walked(processes: Processes, scenario: Path, out: Path, *options: str) -> Path:
-    process = start_walk(processes, scenario, out, *options)
-    assert process.wait(RUN_S) == 0, str(process)
-    return out
-
-
-def plain_run(scenario_file: Path, **values: Any) -> tuple[list[RobotState], list[Any]]:
-    """Run the scenario on the plain loop behind the robot's watchdog; states and ticks."""
-    scenario, suite = load_scenario(scenario_file), load_suite(None, values)
-    robot = MujocoRobot(
-        suite.robot_file, suite.tick_ns, world=suite.world, sensors=suite.sensors
-    )
-    loop = WalkingLoop(robot.description, suite.gait, suite.parameters, load_gaits())
-    states, ticks = [robot.reset()], []
-    guard = CommandWatchdog(
-        robot.description, 200_000_000, round(1e9 * suite.parameters.leg.target_lead))
-
-    def step() -> RobotState:
-        ticks.append(loop.tick(states[-1]))
-        for leg, targets in ticks[-1].targets.by_leg().items():
-            guard.accept(leg, states[-1].time_ns, targets)
-        states.append(robot.step(guard.targets(states[-1])))
-        return states[-1]
-
-    play(scenario, suite.tick_ns, step, {**loop.takers, **robot.takers})
-    return states, ticks
 
 
 def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
@@ -143,7 +93,7 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
         for name, options in kinds.items():
             own = Processes(domains.enter_context(reserved_domain()))
             domains.callback(own.end)
-            started.append(start_walk(own, scenario, tmp_path / name, '--lock-step',
+            started.append(own.walk(scenario, tmp_path / name, '--lock-step',
                                       '--rate', str(SHARED_HZ), *options))
             os.sched_setaffinity(started[-1].pid, {min(os.sched_getaffinity(0))})
         for process in started:
@@ -197,10 +147,9 @@ def test_nodes_let_targets_act_a_lead_after_their_stamp(
 ) -> None:
     scenario = tmp_path / 'leading.yaml'
     scenario.write_text(LEADING, encoding='utf-8')
-    run = walked(processes, scenario, tmp_path / 'run', '--lock-step', '--composed')
+    run = processes.walked(scenario, tmp_path / 'run', '--lock-step', '--composed')
     recording = load_recording(run / 'bag')
-    states, ticks = plain_run(scenario, target_lead=0.02)
-    at_once, _ = plain_run(scenario)
+    (states, ticks), (at_once, _) = plain_run(scenario), plain_run(scenario, target_lead=0.0)
     joints = np.array([state.joint_position for state in states[:-1]])
     np.testing.assert_array_equal(recording.joints.position, joints)
     np.testing.assert_array_equal(recording.targets.position,
@@ -213,7 +162,7 @@ def test_nodes_answer_pushes_as_the_plain_loop_does(
 ) -> None:
     scenario = tmp_path / 'pushed.yaml'
     scenario.write_text(PUSHED, encoding='utf-8')
-    run = walked(processes, scenario, tmp_path / 'run', '--lock-step', '--composed')
+    run = processes.walked(scenario, tmp_path / 'run', '--lock-step', '--composed')
     recording, (states, ticks) = load_recording(run / 'bag'), plain_run(scenario)
     np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
     np.testing.assert_array_equal(recording.reference.value, [tick.r for tick in ticks])
@@ -242,15 +191,9 @@ def test_contacts_reach_the_nodes_at_the_tick_at_which_they_are_measured(
     world = {'world': 'blocks', 'world_height': 0.03}
     values = {**world, **WITH_CONTACTS}
     options = [f'{name}:={str(value).lower()}' for name, value in values.items()]
-    run = walked(
-        processes,
-        scenario,
-        tmp_path / 'run',
-        '--lock-step',
-        '--processes',
-        'blocks',
-        *(word for option in options for word in ('--set', option)),
-    )
+    run = processes.walked(
+        scenario, tmp_path / 'run', '--lock-step', '--processes', 'blocks',
+        *(word for option in options for word in ('--set', option)))
     recording, (_, ticks) = load_recording(run / 'bag'), plain_run(scenario, **values)
     np.testing.assert_array_equal(recording.canonical.x_dot, [tick.x_dot for tick in ticks])
     np.testing.assert_array_equal(
@@ -263,7 +206,7 @@ def test_contacts_reach_the_nodes_at_the_tick_at_which_they_are_measured(
 def test_real_time_run_stops_and_starts(
     processes: Processes, scenario: Path, tmp_path: Path
 ) -> None:
-    run = walked(processes, scenario, tmp_path / 'run', '--composed')
+    run = processes.walked(scenario, tmp_path / 'run', '--composed')
     _, end = load_recording(run / 'bag').span
     with opened(run / 'bag') as reader:
         # When the recorder ends, another topic of the robot may be a tick ahead of the joints.
@@ -284,10 +227,9 @@ def test_real_time_run_stops_and_starts(
 def test_a_dead_node_ends_the_run_and_is_named(
     processes: Processes, scenario: Path, tmp_path: Path
 ) -> None:
-    process = start_walk(processes, scenario, tmp_path / 'run', '--lock-step')
+    process = processes.walk(scenario, tmp_path / 'run', '--lock-step')
     process.wait_for_output('walking', RUN_S)
-    victim = find_child(process.pid, 'leg:fr')
-    os.kill(victim, signal.SIGKILL)
+    os.kill(process.pid_of('leg_transformation_fr'), signal.SIGKILL)
     assert process.wait(RUN_S) == 1
     assert re.search(r'leg_transformation_fr was ended by signal 9', process.output), process
     assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 50
@@ -328,18 +270,3 @@ def test_bad_input_is_refused_with_what_is_valid(
     process = processes.executable('walk', *arguments, '--out', str(tmp_path / 'run'))
     assert process.wait() == 2
     assert text in process.output
-
-
-def find_child(parent: int, name: str) -> int:
-    """Process of a node below a walk, by a word of its command line after ``__node:=``."""
-    word = name.replace('leg:', '__node:=leg_transformation_')
-    for folder in Path('/proc').iterdir():
-        if folder.name.isdigit():
-            try:
-                line = (folder / 'cmdline').read_bytes().decode()
-                status = (folder / 'stat').read_text(encoding='utf-8')
-            except OSError:
-                continue
-            if word in line and int(status.rpartition(')')[2].split()[1]) == parent:
-                return int(folder.name)
-    raise AssertionError(f'no process {word} below {parent}')

@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 import ros_processes
-from ros_processes import SHARED_HZ, Processes
+from ros_processes import RUN_S, SHARED_HZ, Processes
 from walked_feet import Walk
 
 from dmp_cpg_ros.analysis.loading import load_recording
@@ -32,8 +32,6 @@ events:
   - {at: 0.2, command: {v_x: 0.5}}
   - {at: 5.0, inhibit: true}
 """
-RUN_S = 240.0
-"""How long a run may take on a loaded machine before the test gives up [s]."""
 
 
 def test_a_walk_is_learned_from_its_recording_and_walked_again(
@@ -43,9 +41,8 @@ def test_a_walk_is_learned_from_its_recording_and_walked_again(
     scenario.write_text(SCENARIO, encoding='utf-8')
 
     def walk(name: str, *options: str) -> int:
-        return processes.executable(
-            'walk', str(scenario), '--no-report', '--lock-step', '--rate', str(SHARED_HZ),
-            '--composed', '--out', str(tmp_path / name), *options).wait(RUN_S)
+        return processes.walk(scenario, tmp_path / name, '--lock-step', '--rate', str(SHARED_HZ),
+                              '--composed', *options).wait(RUN_S)
 
     assert walk('shown') == 0
     learned = processes.executable('learn', str(tmp_path / 'shown'), '--motion', str(file))

@@ -46,6 +46,9 @@ TESTS, PACKAGES = (str(Path(file).resolve().parents[1]) for file in (__file__, p
 DEADLINE_S = 30.0
 """How long a condition may take before a test fails; a loaded machine is no failure."""
 
+RUN_S = 240.0
+"""How long a run may take on a loaded machine before a test gives up [s]."""
+
 MARK = 'DMP_CPG_ROS_TEST'
 """Variable by which the processes of a test, and theirs, are known."""
 
@@ -92,6 +95,15 @@ class NodeProcess:
     @property
     def pid(self) -> int:
         return self._process.pid
+
+    def pid_of(self, node: str) -> int:
+        """Process of a node of this walk, which it may share with others."""
+        for path in Path('/proc').glob('[0-9]*/cmdline'):
+            with contextlib.suppress(OSError):
+                words = path.read_text(encoding='utf-8').split('\0')
+                if str(self.pid) in words and {node, f'__node:={node}'} & set(words):
+                    return int(path.parent.name)
+        pytest.fail(f'{node} does not run:\n{self.output}')
 
     @property
     def running(self) -> bool:
@@ -180,6 +192,19 @@ class Processes:
         process = NodeProcess(command, {**self.environment, **environment}, forked=forked)
         self._started.append(process)
         return process
+
+    def walk(self, scenario: Path | str, out: Path, *options: str) -> NodeProcess:
+        """Start a walk without a report; a scenario that is a text is written beside ``out``."""
+        if isinstance(scenario, str):
+            text, scenario = scenario, out.with_suffix('.yaml')
+            scenario.write_text(text, encoding='utf-8')
+        return self.executable('walk', str(scenario), '--no-report', '--out', str(out), *options)
+
+    def walked(self, scenario: Path | str, out: Path, *options: str) -> Path:
+        """Walk to the end; returns ``out``."""
+        process = self.walk(scenario, out, *options)
+        assert process.wait(RUN_S) == 0, str(process)
+        return out
 
     def python(self, *arguments: str, **environment: str) -> NodeProcess:
         """Start this Python with arguments."""
