@@ -12,7 +12,6 @@ import argparse
 import math
 import os
 import platform
-import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -26,6 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dmp_cpg_ros.analysis.bag import find_bag, opened, recorded
+from dmp_cpg_ros.analysis.manifest import host_facts
 from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.commands.ros_arguments import run_command
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
@@ -373,10 +373,10 @@ def update(document: Path, text: str) -> None:
 
 def machine() -> str:
     """What was measured on, and how busy it was before."""
-    found = re.search(r'model name\s*: (.*)', Path('/proc/cpuinfo').read_text())
-    return (f'{datetime.now(timezone.utc):%Y-%m-%d}, {os.cpu_count()} processors'
-            f'{f" ({found[1]})" if found else ""}, {platform.platform(terse=True)}, Python '
-            f'{platform.python_version()}, load before the run {os.getloadavg()[0]:.1f}')
+    host = host_facts()
+    return (f'{datetime.now(timezone.utc):%Y-%m-%d}, {host["cores"]} processors '
+            f'({host["processor"]}), {platform.platform(terse=True)}, Python '
+            f'{platform.python_version()}, load before the run {host["load_average"][0]:.1f}')
 
 
 def _cell(value: float) -> str:
