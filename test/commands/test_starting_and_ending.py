@@ -179,7 +179,7 @@ def test_a_walk_in_a_namespace_is_the_walk_without(processes: Processes, tmp_pat
 def test_whatever_ends_walk_ends_its_nodes_and_closes_the_bag(
         processes: Processes, tmp_path: Path, number: int, composed: tuple[str, ...]) -> None:
     process = walk(processes, scenario(tmp_path, 600.0), '--lock-step', '--out',
-                   str(tmp_path / 'run'), '--no-report', *composed)
+                   str(tmp_path / 'run'), '--no-report', '--rate', str(SHARED_HZ), *composed)
     process.wait_for_output('  walking\n', RUN_S)
     nodes = children(process.pid)
     assert len(nodes) == (2 if composed else 10)
@@ -196,7 +196,7 @@ def test_a_walk_goes_on_without_its_recorder_and_says_so_at_once(
         processes: Processes, tmp_path: Path) -> None:
     """A full disk ends the recorder as a signal does."""
     process = walk(processes, scenario(tmp_path, 4.0), '--lock-step', '--out',
-                   str(tmp_path / 'run'), '--no-report', '--composed')
+                   str(tmp_path / 'run'), '--no-report', '--composed', '--rate', str(SHARED_HZ))
     process.wait_for_output('  walking\n', RUN_S)
     (recorder,) = (pid for pid in children(process.pid) if 'bag_recorder' in Path(
         f'/proc/{pid}/cmdline').read_text(encoding='utf-8'))

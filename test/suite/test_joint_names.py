@@ -16,7 +16,7 @@ from checkout import ROOT
 pytest.importorskip('rclpy')
 
 import ros_processes
-from ros_processes import Processes
+from ros_processes import SHARED_HZ, Processes
 from rosbags.highlevel import AnyReader
 
 from dmp_cpg_ros.analysis.bag import payload_digests
@@ -88,9 +88,10 @@ def test_names_that_cannot_be_are_refused(tmp_path: Path, changes: dict[str, Any
 def test_a_run_with_other_names_is_the_same_run(processes: Processes, tmp_path: Path) -> None:
     file = robot_file(tmp_path, UNITREE)
     for out, options in (('usual', []), ('named', ['--robot', str(file)])):
-        processes.walked(SCENARIO, tmp_path / out, '--lock-step', '--composed', *options)
+        processes.walked(SCENARIO, tmp_path / out, '--lock-step', '--composed', '--rate',
+                         str(SHARED_HZ), *options)
     usual, named = (load_recording(tmp_path / out) for out in ('usual', 'named'))
-    assert len(named.joints.time) > 250
+    assert len(named.joints.time) > SHARED_HZ
     for series in ('joints', 'targets'):
         for field in ('time', 'position', 'velocity', 'effort'):
             one, other = (getattr(getattr(run, series), field) for run in (usual, named))

@@ -21,26 +21,26 @@ RUN_S = 600.0
 WALKS = {
     'robot1': """\
 name: one
-duration: 9.0
+duration: 6.5
 events:
-  - {at: 0.5, inhibit: false}
-  - {at: 0.5, command: {v_x: 0.5}}
-  - {at: 2.0, inhibit: true}
-  - {at: 4.0, inhibit: false}
-  - {at: 5.0, command: {v_x: 0.3, gamma: 0.4}}
-  - {at: 6.0, push: {impulse: [0, 3, 0]}}
-  - {at: 7.0, inhibit: true}
+  - {at: 0.3, inhibit: false}
+  - {at: 0.3, command: {v_x: 0.5}}
+  - {at: 1.3, inhibit: true}
+  - {at: 3.0, inhibit: false}
+  - {at: 3.5, command: {v_x: 0.3, gamma: 0.4}}
+  - {at: 4.2, push: {impulse: [0, 3, 0]}}
+  - {at: 5.0, inhibit: true}
 """,
     'robot2': """\
 name: two
-duration: 9.0
+duration: 7.0
 parameters: {gait: trot}
 events:
-  - {at: 0.7, inhibit: false}
-  - {at: 0.7, command: {v_x: 0.8, v_y: -0.1}}
-  - {at: 2.2, gait: amble}
-  - {at: 3.5, lie_down: true}
-  - {at: 7.0, stand_up: true}
+  - {at: 0.5, inhibit: false}
+  - {at: 0.5, command: {v_x: 0.8, v_y: -0.1}}
+  - {at: 1.2, gait: amble}
+  - {at: 2.2, lie_down: true}
+  - {at: 6.0, stand_up: true}
 """,
 }
 """What two robots do, each something else, with requests at other times."""
