@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from core_examples import quadruped
 
-from dmp_cpg_ros.studies import adversary_networks, adversary_rows
+from dmp_cpg_ros.studies import adversary, adversary_networks, adversary_rows
 from dmp_cpg_ros.studies.adversary import FOLLOWING, WEAKENED, main, search
 from dmp_cpg_ros.studies.adversary_suite import CONDITIONS, Oscillators, play, smaller
 from dmp_cpg_ros.studies.draws import Case
@@ -126,7 +126,9 @@ def test_a_failure_is_made_smaller() -> None:
     assert len(small['events']) == 1 and small['parameters'] == {}
 
 
-def test_the_command_counts_what_it_tried(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_counts_what_it_tried(capsys: pytest.CaptureFixture[str],
+                                          monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(adversary, 'SHRINK_S', 1.0)
     assert main(['--seconds', '1', '--weaken', 'capture', '--failures', '1']) == 1
     told = capsys.readouterr().out
     assert told.startswith('| 0 | 1 x 1 s | capture |') and 'happened: leaves C' in told

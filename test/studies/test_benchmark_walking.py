@@ -89,10 +89,11 @@ def test_a_push_is_felt_and_a_blow_is_fatal() -> None:
 
 
 def test_a_crossing_ends_at_the_finish_or_on_the_ground(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(walking_trials, 'CROSSING_TIME', 12.0)  # twice as long as on the flat
+    monkeypatch.setattr(walking_trials, 'FINISH', 2.5)
+    monkeypatch.setattr(walking_trials, 'CROSSING_TIME', 6.0)  # twice as long as on the flat
     flat = cross('trot', 'flat', {}, 0, speed=0.8)
     assert flat.crossed and not flat.fell
-    assert flat.time == pytest.approx(5.0 / 0.8, rel=0.2)
+    assert flat.time == pytest.approx(2.5 / 0.8, rel=0.2)
     wall = cross('trot', 'steps', {'height': 0.5}, 0, speed=0.8)
     assert not wall.crossed and wall.distance < 2.0
 
