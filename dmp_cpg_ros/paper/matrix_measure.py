@@ -314,26 +314,3 @@ def disagreement_measure(L: Array, size: int, jacobians: Sequence[Array], norm: 
     choices = np.array(list(product(range(len(jacobians)), repeat=size)))    # (cases, N)
     cases = sum(terms[i][choices[:, i]] for i in range(size))
     return float(matrix_measure(cases - V @ L @ V.T, norm).max())
-
-
-def hopf_jacobian_vertices(rho: float, radius: float, omega: float, directions: int = 8
-                           ) -> list[Array]:
-    """Matrices whose hull contains the Andronov-Hopf Jacobian for every |x| ≤ radius.
-
-    A = ωS + ρr²I − ρ|x|²(2I + P), with P = 2uuᵀ − I a reflection. The reflections form a circle in
-    the symmetric traceless matrices; a regular polygon around it encloses them.
-
-    Parameters
-    ----------
-    rho, radius, omega : float
-        Parameters of the oscillator.
-    directions : int
-        Corners of the polygon, at least 3.
-    """
-    S = np.array([[0.0, 1.0], [-1.0, 0.0]])
-    at_origin = omega * S + rho * radius**2 * np.eye(2)
-    angles = 2.0 * np.pi * np.arange(directions) / directions
-    stretch = 1.0 / np.cos(np.pi / directions)
-    on_cycle = [at_origin - rho * radius**2 * (2.0 * np.eye(2) + stretch * np.array(
-        [[np.cos(a), np.sin(a)], [np.sin(a), -np.cos(a)]])) for a in angles]
-    return [at_origin, *on_cycle]

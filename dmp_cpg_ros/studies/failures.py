@@ -58,9 +58,6 @@ RESTS = 3
 Cell = tuple[str, str, str]
 """Gait, component, kind."""
 
-CELLS: tuple[Cell, ...] = tuple((gait, component, kind) for gait in GAITS
-                                for component in COMPONENTS for kind in KINDS)
-
 
 class Case(NamedTuple):
     """A failure in a walk.

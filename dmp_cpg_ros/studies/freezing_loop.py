@@ -38,10 +38,6 @@ class FreezingLoop(WalkingLoop):
         """
         self._finish_swing, self._frozen = finish_swing, np.zeros(len(LEGS), dtype=bool)
 
-    def resume(self) -> None:
-        """Walk on from the phases and joint angles at which the legs are."""
-        self._frozen = None
-
     def tick(self, state: RobotState) -> Tick:
         """Run all parts on the robot's state of one tick, as :meth:`WalkingLoop.tick`."""
         if self._frozen is None:

@@ -136,15 +136,6 @@ class TwoHosts:
         return ''
 
 
-def may_make_hosts() -> bool:
-    """Whether this process can make hosts."""
-    try:
-        Host('10.87.0.1').close()
-    except NoHostsError:
-        return False
-    return True
-
-
 def _call(name: str, *arguments: int) -> None:
     libc = ctypes.CDLL(None, use_errno=True)
     if getattr(libc, name)(*arguments):

@@ -81,7 +81,7 @@ def test_two_runs_are_identical_bit_for_bit(robot: MujocoRobot) -> None:
 
 
 @pytest.mark.parametrize('finish_swing', [False, True])
-def test_the_baselines_freeze_every_leg_and_walk_on(
+def test_the_baselines_freeze_every_leg(
         robot: MujocoRobot, finish_swing: bool) -> None:
     loop = FreezingLoop(robot.description, GAITS['walk'], suite_parameters())
     loop.command(0.3)
@@ -94,6 +94,3 @@ def test_the_baselines_freeze_every_leg_and_walk_on(
     assert np.array_equal(frozen.position, later.position) and not later.velocity.any()
     moved = np.abs(loop.x - at_request).max(axis=1) > 1e-9
     assert moved.any() == finish_swing and not moved.all()
-    loop.resume()
-    states = walk(robot, loop, 3.0, robot.step(later))
-    assert states[-1].base_velocity_in_base[0] > 0.15

@@ -25,7 +25,6 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.paper.matrix_measure import (
     coupling_measure,
     disagreement_measure,
-    hopf_jacobian_vertices,
     matrix_measure,
 )
 from dmp_cpg_ros.studies.draws import random_edges
@@ -194,6 +193,22 @@ def test_the_remark_holds_in_the_2_norm_and_not_in_the_maximum_norm() -> None:
         in_max.append(matrix_measure(projected, np.inf) - A.max())
     assert max(in_2) <= 1e-12
     assert max(in_max) > 0.01
+
+
+def hopf_jacobian_vertices(rho: float, radius: float, omega: float, directions: int = 8
+                           ) -> list[np.ndarray]:
+    """Matrices whose hull contains the Andronov-Hopf Jacobian for every |x| ≤ radius.
+
+    A = ωS + ρr²I − ρ|x|²(2I + P), with P = 2uuᵀ − I a reflection. The reflections form a circle in
+    the symmetric traceless matrices; a regular polygon around it encloses them.
+    """
+    S = np.array([[0.0, 1.0], [-1.0, 0.0]])
+    at_origin = omega * S + rho * radius**2 * np.eye(2)
+    angles = 2.0 * np.pi * np.arange(directions) / directions
+    stretch = 1.0 / np.cos(np.pi / directions)
+    on_cycle = [at_origin - rho * radius**2 * (2.0 * np.eye(2) + stretch * np.array(
+        [[np.cos(a), np.sin(a)], [np.sin(a), -np.cos(a)]])) for a in angles]
+    return [at_origin, *on_cycle]
 
 
 @pytest.mark.parametrize('norm', [1, 2, np.inf])
