@@ -202,7 +202,7 @@ class FootPlacement:
         Feet that hold a body which goes backwards roll it to one side, where it stays: they go
         along further, by ``BACKWARDS`` of what is left from a dimensionless speed of ``QUICK`` on.
         Not where all legs swing together: they pitch it the more the less they hold it; nor where
-        one side stands alone, which they roll the more.
+        one side or one end stands alone, which they tilt the more.
 
         Parameters
         ----------
@@ -211,7 +211,8 @@ class FootPlacement:
         v_x : float
             Reference [m/s].
         firm : float
-            Of the gait: 0 where all legs swing together or one side stands alone, else 1.
+            Of the gait: 0 where all legs swing together, or one side or one end stands alone, else
+            1.
         """
         if v_x >= 0.0:
             return p.yielding

@@ -22,7 +22,7 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.phase import wrapped
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce
-from dmp_cpg_ros.core.gait.lags import rest_phase, stance_groups, two_sided
+from dmp_cpg_ros.core.gait.lags import ENDS, SIDES, rest_phase, stance_groups, stand_together
 from dmp_cpg_ros.core.gait.speed_limit import fastest_swing, swing_acceleration, within_limit
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
@@ -128,6 +128,9 @@ class CycleOfLegs(ABC):
         0 where all legs swing together, which turns the body, else 1; between while gaits change.
     two_sided : float
         Share of stance with feet of both sides on the ground, where it is shortest.
+    firm : float
+        1 where feet of both sides and of both ends stand nearly all the time, as in a trot, a walk
+        and an amble, else 0; between while gaits change.
     rest_rate : float
         Rate of the rest phase, to be added to the rate of a leg's phase [rad/s]; 0, other than
         while gaits change.
@@ -138,6 +141,7 @@ class CycleOfLegs(ABC):
     moving_phases: Array | None = None
     apart: float = 1.0
     two_sided: float = 1.0
+    firm: float = 1.0
     rest_rate: float = 0.0
     _paced: tuple[tuple[float, ...], Pace] | None = None
 
@@ -171,13 +175,6 @@ class CycleOfLegs(ABC):
     def wide(self) -> float:
         """1 where feet of both sides stand for long enough, 0 where one side stands alone."""
         return min(1.0, self.two_sided / WIDE_STANCE)
-
-    @property
-    def firm(self) -> float:
-        """1 where some legs stand on both sides meanwhile, 0 where all swing together or one side
-        stands alone.
-        """
-        return self.apart * self.wide
 
     def limiting_speed(self, velocity: Triple, scale: BodyScale) -> float:
         """Foot speed of a velocity (v_x, v_y [m/s], γ [rad/s]) that counts by the highest speed
@@ -257,6 +254,7 @@ class Gait(CycleOfLegs):
     groups: int = field(init=False)
     steps: int = field(init=False)
     two_sided: float = field(init=False)
+    firm: float = field(init=False, default=1.0)
     apart: float = field(init=False, default=1.0)
     cadence_scale: float = field(init=False, default=1.0)
     _tables: tuple[list[float], ...] = field(init=False, repr=False, compare=False)
@@ -285,10 +283,13 @@ class Gait(CycleOfLegs):
              f'{self.highest_speed:g}')):
             if not holds:
                 raise ParameterError(f"gait '{self.name}': {rule}")
+        together = [stand_together(lag, float(self.duty_factor.min()), parts)
+                    for parts in (SIDES, ENDS)]
         vars(self).update(
             rest=rest_phase(lag), phases=-2.0 * np.pi * lag, groups=stance_groups(lag),
             apart=float(stance_groups(lag) != 1), steps=len(np.unique(np.round(lag % 1.0, 9))),
-            two_sided=two_sided(lag, float(self.duty_factor.min())),
+            two_sided=together[0], firm=float(
+                stance_groups(lag) != 1 and min(together) >= WIDE_STANCE),
             _tables=tuple(table.tolist() for table in tables),
             _nominal=self.cadence.tolist(), _highest=(inf, self.highest_speed))
 

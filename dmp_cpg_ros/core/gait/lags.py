@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from dmp_cpg_ros.core.maths import Array
@@ -41,8 +43,13 @@ def rest_phase(lag: Array) -> float:
     return float(min(middles[own > own.max() - 1e-6]))
 
 
-def two_sided(lag: Array, duty: float, grid: int = 400) -> float:
-    """Share of the stance of some foot in which feet of both sides stand.
+SIDES, ENDS = ((0, 2), (1, 3)), ((0, 1), (2, 3))
+"""Legs of the two sides, and of the front and the hind end."""
+
+
+def stand_together(lag: Array, duty: float, parts: Sequence[Sequence[int]], grid: int = 400
+                   ) -> float:
+    """Share of the stance of some foot in which feet of both parts of the legs stand.
 
     Parameters
     ----------
@@ -50,10 +57,12 @@ def two_sided(lag: Array, duty: float, grid: int = 400) -> float:
         Fractions of a cycle by which fl, fr, rl, rr follow the first.
     duty : float
         Duty factor β.
+    parts : pair of sequences of int
+        ``SIDES`` or ``ENDS``.
     grid : int
         Number of phases that are looked at.
     """
     at = (np.arange(grid)[:, None] / grid - lag + 0.5) % 1.0 - 0.5
-    left, right = (np.any((np.abs(at) > 0.5 * (1.0 - duty))[:, legs], axis=1)
-                   for legs in ([0, 2], [1, 3]))
-    return float(np.sum(left & right) / max(1, np.sum(left | right)))
+    one, other = (np.any((np.abs(at) > 0.5 * (1.0 - duty))[:, list(legs)], axis=1)
+                  for legs in parts)
+    return float(np.sum(one & other) / max(1, np.sum(one | other)))

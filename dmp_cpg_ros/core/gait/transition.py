@@ -166,6 +166,7 @@ class BlendedGait(CycleOfLegs):
     rest: float = field(init=False, repr=False, compare=False)
     apart: float = field(init=False, repr=False, compare=False)
     two_sided: float = field(init=False, repr=False, compare=False)
+    firm: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Validate and blend; ``turning`` is 2π dw/dt, the rate of an arc of one cycle [rad/s]."""
@@ -177,9 +178,9 @@ class BlendedGait(CycleOfLegs):
         phases = way.before.phases + (2.0 * np.pi * weight) * way.offset_arcs
         vars(self).update(
             weight=weight, turning=turning, rest=way.before.rest + weight * way.rest_arc,
-            apart=way.before.apart + weight * (way.after.apart - way.before.apart),
-            two_sided=way.before.two_sided + weight * (
-                way.after.two_sided - way.before.two_sided),
+            **{name: getattr(way.before, name) + weight * (
+                getattr(way.after, name) - getattr(way.before, name))
+               for name in ('apart', 'two_sided', 'firm')},
             phases=phases, moving_phases=phases, rest_rate=turning * way.rest_arc)
 
     @property
