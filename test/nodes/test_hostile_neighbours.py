@@ -51,7 +51,7 @@ from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.push import LARGEST_FORCE
 from dmp_cpg_ros.nodes.framework import certified
 from dmp_cpg_ros.nodes.framework.gaits import follow_gait, known_gaits
-from dmp_cpg_ros.nodes.framework.writers import SILENT_NS
+from dmp_cpg_ros.nodes.framework.writer_watch import SILENT_NS
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.conversions import read_push_force

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections import Counter
 
@@ -11,7 +12,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.nodes.framework.writers import (
+from dmp_cpg_ros.nodes.framework.writer_watch import (
     LOST,
     PROVEN,
     REMEMBERED_NS,
@@ -141,6 +142,48 @@ def test_a_stranger_on_a_topic_of_changes_is_told_from_its_writer(first: int) ->
     for k in range(first, 50):
         assert not watch.admits(k, 0, 10 * SILENT_NS + k)
     assert watch.admits(5, 0, 20 * SILENT_NS)
+
+
+def test_on_a_topic_of_changes_silence_is_no_chance_for_a_stranger_beside_its_writer() -> None:
+    """As the graph tells while both are there; before the first change of the writer, nothing
+    tells them apart.
+    """
+    watch = WriterWatch(lambda: None, ticked=False)
+    assert watch.admits(1, 0, SILENT_NS) and watch.admits(7, 0, SILENT_NS) and not watch.known
+    watch._may_take_over = lambda: True
+    assert all(watch.admits(k, 0, SILENT_NS) for k in range(1, 5)) and watch.known
+    watch._may_take_over = lambda: None
+    for number in (1, 2, 9, 10):
+        assert not watch.admits(number, 0, (10 + number) * SILENT_NS)
+    watch.refuse(4, 21 * SILENT_NS)
+    assert not watch.admits(5, 0, 22 * SILENT_NS)
+    assert watch.admits(5, 0, 30 * SILENT_NS)
+
+
+def test_a_gap_is_a_loss_only_where_nobody_else_publishes() -> None:
+    for alone, passed in ((True, True), (None, False)):
+        watch = watched(ticked=False, known=4)
+        watch._may_take_over = lambda alone=alone: alone
+        assert watch.admits(7, 0, 5 * TICK_NS) is passed
+
+
+@pytest.mark.parametrize('ticked', [True, False])
+def test_a_writer_of_which_a_restart_is_known_is_taken_up_before_it_was_silent(
+        ticked: bool) -> None:
+    watch = watched(ticked=ticked)
+    now_ns = KNOWN * TICK_NS
+    assert not watch.admits(1, now_ns + TICK_NS, now_ns + TICK_NS)
+    watch.forget()
+    assert not watch.known
+    assert all(watch.admits(k, now_ns + k * TICK_NS, now_ns + k * TICK_NS) for k in range(2, 9))
+
+
+def test_who_looks_now_and_then_knows_the_writer_all_the_same() -> None:
+    """Many messages pass between two looks, as many as there are."""
+    watch = WriterWatch(lambda: not watch.known, most_lost=math.inf)
+    for number in range(1, 100 * KNOWN, KNOWN):
+        assert watch.admits(number, number * TICK_NS, number * TICK_NS)
+        assert not watch.admits(number // 2, number * TICK_NS, number * TICK_NS)
 
 
 def test_in_lock_step_the_writer_does_not_keep_to_the_clock() -> None:
