@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """``live_view``: a running suite in a browser, to look at, to drive, to push and to stop.
 
-It is a client of topics, services and parameters as any other, and reads what it shows at the rate
-at which it shows it: messages in between wake nobody.
+It is a client of topics, services and parameters as any other, and reads what comes at every tick
+at the rate at which it shows it: messages in between wake nobody.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ from dmp_cpg_ros.core.parameters import Parameters, shown
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.nodes.framework.execution import schedule
+from dmp_cpg_ros.nodes.framework.own_messages import OwnMessages
 from dmp_cpg_ros.nodes.framework.parameters import (
     BATCH,
     LockStepParameters,
@@ -51,7 +52,6 @@ from dmp_cpg_ros.nodes.framework.parameters import (
     plain,
 )
 from dmp_cpg_ros.nodes.messages import conversions
-from dmp_cpg_ros.nodes.messages.cdr import unless_refused
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, interface
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, JointsReader, read_odom
 from dmp_cpg_ros.nodes.messages.values import checked_numbers, header_ns
@@ -79,7 +79,7 @@ TIMED_S = 1.0
 """Span over which the real-time factor is taken [s]."""
 
 STATE_TOPICS = ('ground_truth', 'odom', 'joint_states', 'canonical_state', 'reference',
-                'inhibition_gains', 'foot_contacts')
+                'foot_contacts')
 """What is read for every frame."""
 
 
@@ -166,19 +166,24 @@ class LiveView:
             'joint_states': lambda message: (header_ns(message), joints.read(message)[0]),
             'canonical_state': conversions.CanonicalStateReader(gaits).read,
             'reference': conversions.read_reference,
-            'inhibition_gains': conversions.InhibitionGainsReader().read,
             'foot_contacts': FootContactsReader().read}
+        heard = OwnMessages(self._node, self._node.get_logger().warning,
+                            lock_step=not self.drives)
         group, self._polled = Polled(), []
         for name in STATE_TOPICS:
             topic = interface(name)
             subscription = self._node.create_subscription(
-                topic.type, name, lambda _: None, topic.reader_qos if topic.latched else newest,
-                callback_group=group)
-            self._polled.append((name, subscription, readers.get(name, read_odom)))
-        for name, hear in (('inhibition_state', self._hear_stop), ('body_mode', self._hear_mode)):
-            topic = interface(name)
-            self._node.create_subscription(topic.type, name, unless_refused(topic.type, hear),
-                                           topic.reader_qos, raw=True)
+                topic.type, name, lambda _: None, newest, callback_group=group)
+            self._polled.append((name, subscription, heard.admitting(topic),
+                                 readers.get(name, read_odom)))
+        gains = conversions.InhibitionGainsReader()
+
+        def hear_gains(message: Any) -> None:
+            self._values['inhibition_gains'] = gains.read(message)
+
+        for name, hear in (('inhibition_state', self._hear_stop), ('body_mode', self._hear_mode),
+                           ('inhibition_gains', hear_gains)):
+            heard.listen(interface(name), hear)
 
     def _make_ends(self, velocity: Any) -> None:
         """Create the ends of commands; those of services first: see SuiteClient."""
@@ -311,12 +316,13 @@ class LiveView:
 
     def _frame(self, now: float) -> dict[str, Any]:
         """What is shown of this moment; empty as long as there is nothing."""
-        for name, subscription, read in self._polled:
+        for name, subscription, admits, read in self._polled:
             with subscription.handle:
                 taken = subscription.handle.take_message(subscription.msg_type, False)
             if taken is not None:
                 try:
-                    self._values[name] = read(taken[0])
+                    if admits(header_ns(taken[0]), taken[1]):
+                        self._values[name] = read(taken[0])
                 except DataError as error:
                     self._node.get_logger().warning(f'{name}: {error}', throttle_duration_sec=5.0)
         values = self._values

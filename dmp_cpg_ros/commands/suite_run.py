@@ -31,7 +31,7 @@ from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.nodes.framework import claims, execution, health
 from dmp_cpg_ros.nodes.messages.conversions import DRIVE_MODES
-from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.interfaces import private
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
 from dmp_cpg_ros.suite_table import (
     COMPOSED,
@@ -273,9 +273,7 @@ class _Watch:
         self._recording, self._begun, self._ending = True, False, False
         self.unrecorded = ''
         self._recorded: Any = None
-        topic = interface('~/recorded')
-        player.create_subscription(
-            topic.type, f'{RECORDER}/recorded', self._on_recorded, topic.reader_qos)
+        player.heard.listen(private('~/recorded', RECORDER), self._on_recorded)
 
     def until(self, future: Future, patience_s: float) -> bool:
         """Spin until a future is done; returns whether it is. Ctrl-C cuts it short, but not while

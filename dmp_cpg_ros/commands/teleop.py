@@ -20,7 +20,7 @@ from rclpy.task import Future
 from dmp_cpg_ros.commands.joystick import Joystick
 from dmp_cpg_ros.commands.suite_client import ClientError, SuiteClient, velocity_command
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.nodes.messages.cdr import unless_refused
+from dmp_cpg_ros.nodes.framework.own_messages import OwnMessages
 from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 
@@ -87,10 +87,9 @@ class Teleop:
         services = {key: interface(name) for key, name in SERVICES.items()}
         self._clients = {key: node.create_client(service.type, service.name)
                          for key, service in services.items()}
+        heard = OwnMessages(node, self._print)
         for name, callback in (('inhibition_state', on_state), ('inhibition_gains', on_gains)):
-            topic = interface(name)
-            node.create_subscription(topic.type, topic.name, unless_refused(topic.type, callback),
-                                     topic.reader_qos, raw=True)
+            heard.listen(interface(name), callback)
         kinds = {kind for service in services.values() for kind in service.publishers}
         client.meet(sorted(kinds), *self._clients.values())
 
@@ -122,7 +121,11 @@ class Teleop:
 
     def _answered(self, future: Future) -> None:
         answer = future.result()
-        print(f'\r\x1b[K{"" if answer.success else "refused: "}{answer.message}')
+        self._print(f'{"" if answer.success else "refused: "}{answer.message}')
+
+    def _print(self, text: str) -> None:
+        """Print a line in the place of the last one, which follows it."""
+        print(f'\r\x1b[K{text}')
         self._shown = ''
 
 

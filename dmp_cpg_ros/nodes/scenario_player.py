@@ -28,16 +28,16 @@ from dmp_cpg_ros.core.scenario.fault import Fault
 from dmp_cpg_ros.core.scenario.push import Push
 from dmp_cpg_ros.core.scenario.scenario import Action, Command, Scenario
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
+from dmp_cpg_ros.nodes.framework.own_messages import OwnMessages
 from dmp_cpg_ros.nodes.framework.parameters import plain
-from dmp_cpg_ros.nodes.messages.cdr import unless_refused
 from dmp_cpg_ros.nodes.messages.conversions import (
     DRIVE_MODES,
     read_body_mode,
     read_drive_mode,
     read_state_word,
 )
-from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, interface
-from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamp_ns
+from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, interface, private
+from dmp_cpg_ros.nodes.messages.values import header_ns, read_counts, set_stamp, stamp_ns
 
 FAR_NS = 2**31 * 10**9 - 1
 """A stamp later than every run [ns]."""
@@ -66,20 +66,21 @@ class AcknowledgedTopic:
     ----------
     node : Node
         Who sends.
+    heard : OwnMessages
+        What it reads.
     name : str
         Topic whose readers tell of it on ``~/commands_taken``.
     """
 
-    def __init__(self, node: Node, name: str) -> None:
+    def __init__(self, node: Node, heard: OwnMessages, name: str) -> None:
         """Create the publisher, and a subscription for each reader."""
-        topic, taken, self._name = interface(name), interface('~/commands_taken'), name
+        topic, self._name = interface(name), name
         self._publisher = node.create_publisher(topic.type, topic.name, topic.publisher_qos)
         self._sent, self._taken = 0, dict.fromkeys(topic.subscribers, 0.0)
         self._missed, self._last = dict.fromkeys(topic.subscribers, 0), list[Any]()
         self._then: Callable[[], None] | None = None
         self._answers = [
-            node.create_subscription(taken.type, f'{reader}/commands_taken',
-                                     self._hearing(reader), taken.reader_qos)
+            heard.listen(private('~/commands_taken', reader), self._hearing(reader))
             for reader in topic.subscribers]
 
     def connected(self) -> bool:
@@ -104,8 +105,7 @@ class AcknowledgedTopic:
 
     def _hearing(self, reader: str) -> Callable[[JointState], None]:
         def hear(message: JointState) -> None:
-            counts = dict(zip(message.name, message.position, strict=True))
-            self._taken[reader] = counts.get(self._name, 0.0)
+            self._taken[reader] = read_counts(message).get(self._name, 0.0)
             self._look()
 
         return hear
@@ -216,6 +216,8 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
 
     Attributes
     ----------
+    heard : OwnMessages
+        What it reads of the suite.
     finished : Future
         Done at the end of the scenario, with an exception when it could not be played.
     time_ns : int
@@ -240,8 +242,9 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self.time_ns, self.mode, self.drive, self.finished = 0, '', DRIVE_MODES[0], Future()
         self._until_ns, self._again_ns = -1, 0
         self._lain: Future | None = None
+        self.heard = OwnMessages(self, self._warn, lock_step=lock_step)
         voting = any(action.kind == 'votes' for action in self._actions)
-        self._topics = {name: AcknowledgedTopic(self, name) for name in (
+        self._topics = {name: AcknowledgedTopic(self, self.heard, name) for name in (
             'cmd_vel', 'push', *(['votes'] if voting else []))}
         gate = interface(f'{GATE_OWNER}/advance_until')
         self._gate = self.create_publisher(Clock, gate.name, gate.publisher_qos)
@@ -262,9 +265,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             'drive_mode': self._on_drive_mode,
             **({} if lock_step else {'/clock': self._on_clock})}
         for name, callback in heard.items():
-            topic = interface(name)
-            self.create_subscription(topic.type, topic.name, unless_refused(topic.type, callback),
-                                     topic.reader_qos, raw=True)
+            self.heard.listen(interface(name), callback)
 
     def connected(self) -> bool:
         """Whether the gate, the readers of commands and the services are there."""
@@ -290,6 +291,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         """Tell nodes that were restarted what they missed: the commands and, in lock-step, the
         last tick.
         """
+        self.heard.forget(nodes)
         for topic in self._topics.values():
             topic.renew(nodes)
         if self.busy:
@@ -302,6 +304,9 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         """
         if self._lock_step and self._until_ns >= 0:
             self._open(self._until_ns)
+
+    def _warn(self, text: str) -> None:
+        self._say(self.progress_ns * 1e-9, text)
 
     # Lock-step: the robot holds, everything is delivered, the robot goes on ----------------------
 

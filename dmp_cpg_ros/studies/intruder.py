@@ -26,7 +26,7 @@ from pathlib import Path
 import rclpy
 
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
-from dmp_cpg_ros.studies.intruder_attacks import ATTACKS
+from dmp_cpg_ros.studies.intruder_attacks import ATTACKS, LAST_S
 from dmp_cpg_ros.studies.intruder_node import Intruder
 from dmp_cpg_ros.studies.output import markdown_table
 from dmp_cpg_ros.studies.process_usage import children, resident_mb
@@ -79,7 +79,7 @@ class Suite:
         node.spin(1.0)  # what the last run has left in queues
         node.fell, self._runs = False, self._runs + 1
         node.poses.clear()
-        self._walk = WalkProcess.of(self._folder / f'run{self._runs}', 36000.0, [
+        self._walk = WalkProcess.of(self._folder / f'run{self._runs}', LAST_S, [
             {'at': 0.5, 'inhibit': False}, {'at': 1.0, 'command': {'v_x': SPEED}}],
             *self._options)
         end = time.monotonic() + WITHIN_S

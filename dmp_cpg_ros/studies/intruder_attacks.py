@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Parameter as ParameterMessage
@@ -21,6 +22,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameter_events
 from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -35,6 +37,9 @@ from dmp_cpg_ros.suite_table import POSTURE, ROBOT, WALKING_NODES
 
 ATTACK_S = 2.0
 """Length of an attack [s]."""
+
+LAST_S = 36_000
+"""Length of the walk, which nobody waits for [s]."""
 
 OWN = tuple(topic for topic in TOPICS if topic.publishers != ('user',) and topic.recorded
             and topic.name not in ('/clock', '/diagnostics', 'joint_work', 'odom', '/tf'))
@@ -153,6 +158,20 @@ def _modes(node: Intruder) -> None:
     node.repeat(0.5, 250.0, lambda: node.changed('posture_feedback', forge))
 
 
+def _progress(node: Intruder) -> None:
+    """What a scenario goes by: the robot's clock, what it does, and how far the stop is."""
+    late = Clock()
+    set_stamp(late.clock, LAST_S * 10**9)
+    words = DiagnosticArray(status=[DiagnosticStatus(name=core.INHIBITION, message='at_rest')])
+
+    def forge() -> None:
+        node.publish('/clock', late)
+        node.publish('drive_mode', String(data='damp'))
+        node.publish('inhibition_state', words)
+
+    node.repeat(ATTACK_S, 50.0, forge)
+
+
 def _events(node: Intruder) -> None:
     publisher = node.create_publisher(
         ParameterEvent, '/parameter_events', qos_profile_parameter_events)
@@ -220,6 +239,7 @@ ATTACKS: dict[str, Callable[[Intruder], None]] = {
     'joint_states zero': _forger('joint_states', _filled('position', 0.0)),
     'inhibition_gains': _gains,
     'body_mode': _modes,
+    'clock, drive_mode and inhibition_state': _progress,
     '10 MB': _huge,
     **{f'flood of old {name}': _flood(name, partial(_newest, name))
        for name in ('canonical_state', 'joint_targets', 'joint_states')},

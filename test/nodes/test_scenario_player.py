@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import pytest
@@ -13,11 +13,21 @@ pytest.importorskip('rclpy')
 
 import rclpy
 import ros_processes
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.task import Future
+from ros_processes import wait_until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 from dmp_cpg_ros.core.scenario.scenario import Scenario
+from dmp_cpg_ros.core.suite_parameters import INHIBITION
 from dmp_cpg_ros.nodes import scenario_player
+from dmp_cpg_ros.nodes.framework.execution import make_executor
+from dmp_cpg_ros.nodes.messages.conversions import DRIVE_MODES
+from dmp_cpg_ros.nodes.messages.interfaces import Interface, interface
 from dmp_cpg_ros.nodes.messages.values import set_stamp
 from dmp_cpg_ros.nodes.scenario_player import (
     REPEAT_NS,
@@ -25,6 +35,7 @@ from dmp_cpg_ros.nodes.scenario_player import (
     PlayerError,
     ScenarioPlayer,
 )
+from dmp_cpg_ros.suite_table import ROBOT
 
 ros_domain = ros_processes.ros_domain
 
@@ -113,3 +124,126 @@ def test_in_lock_step_who_is_restarted_before_it_has_answered_is_asked_again(
     assert not player.busy and '  inhibit: walking' in said
     player._on_gains(gains(100_000_000 - TICK_NS))
     assert len(asked) == 2
+
+
+# What strangers say of the suite -----------------------------------------------------------------
+
+
+class Neighbours:
+    """Nodes of the suite's names that say what the player reads, and an intruder who does too."""
+
+    def __init__(self, player: ScenarioPlayer, topics: Sequence[str]) -> None:
+        self._executor, self._player = make_executor('events'), player
+        self._executor.add_node(player)
+        self._nodes: dict[str, Node] = {}
+        self._own = {name: self._publisher(interface(name).publishers[0], interface(name))
+                     for name in topics}
+        self._forged: dict[str, Publisher] = {}
+
+    def _publisher(self, owner: str, topic: Interface) -> Publisher:
+        """Publisher that the player and the graph know."""
+        if owner not in self._nodes:
+            self._nodes[owner] = Node(owner)
+        qos, ends = topic.publisher_qos, self._player.get_publishers_info_by_topic
+        qos.depth = 100  # so that nothing is lost
+        publisher = self._nodes[owner].create_publisher(topic.type, topic.name, qos)
+        wait_until(lambda: publisher.get_subscription_count() > 0 and owner in {
+            end.node_name for end in ends(publisher.topic_name)})
+        return publisher
+
+    def tell(self, name: str, *messages: Any) -> None:
+        for message in messages:
+            self._own[name].publish(message)
+
+    def join(self) -> None:
+        """The intruder comes."""
+        self._forged = {name: self._publisher('intruder', interface(name)) for name in self._own}
+
+    def forge(self, name: str, message: Any) -> None:
+        for _ in range(9):
+            self._forged[name].publish(message)
+
+    def until(self, condition: Callable[[], bool], meanwhile: Callable[[], object] = lambda: None
+              ) -> None:
+        def spin() -> None:
+            meanwhile()
+            self._executor.spin_until_future_complete(Future(), timeout_sec=0.01)
+
+        wait_until(condition, between=spin)
+
+    def end(self) -> None:
+        for node in self._nodes.values():
+            node.destroy_node()
+
+
+def clock(stamp: int) -> Clock:
+    message = Clock()
+    set_stamp(message.clock, stamp)
+    return message
+
+
+def state(word: str) -> DiagnosticArray:
+    return DiagnosticArray(status=[DiagnosticStatus(name=INHIBITION, message=word)])
+
+
+@pytest.mark.parametrize('lock_step', [False, True])
+def test_nobody_else_makes_events_come_early_or_ends_the_scenario(
+        context: None, monkeypatch: pytest.MonkeyPatch, lock_step: bool) -> None:
+    """A forged clock, gate and end of a tick, and what the robot would do, of somebody who came
+    after the suite; each is told once.
+    """
+    asked, said, gate = list[int](), list[str](), f'{ROBOT}/holding_at'
+
+    def ask(client: Any, request: Any, done: Callable[[bool, str], None]) -> None:
+        asked.append(player.time_ns)
+        done(True, 'it is asked')
+
+    monkeypatch.setattr(scenario_player, 'ask', ask)
+    scenario = Scenario.from_mapping(
+        {'name': 'late', 'duration': 10.0, 'events': [{'at': 5.0, 'inhibit': False}]}, 'test')
+    player = ScenarioPlayer(scenario, TICK_NS, lock_step, lambda _, text: said.append(text))
+    topics = ('body_mode', 'drive_mode', 'inhibition_state', 'inhibition_gains',
+              gate if lock_step else '/clock')
+    suite, due_ns, end_ns = Neighbours(player, topics), 5_000_000_000, 10_000_000_000
+    now_ns = 0
+
+    def tick(time_ns: int) -> None:
+        nonlocal now_ns
+        now_ns = time_ns
+        suite.tell('inhibition_gains', gains(time_ns - TICK_NS))
+        suite.tell(topics[-1], clock(time_ns))
+
+    def ticks(until_ns: int) -> None:
+        """In real time all of them, for a clock does not jump."""
+        for time_ns in range(now_ns + 100 * TICK_NS, until_ns, 100 * TICK_NS):
+            tick(time_ns)
+        tick(until_ns)
+
+    def go_on() -> None:
+        tick(now_ns if lock_step else now_ns + TICK_NS)
+
+    suite.tell('body_mode', String(data='standing'))
+    suite.tell('drive_mode', String(data=DRIVE_MODES[0]))
+    suite.tell('inhibition_state', state('walking'))
+    for _ in range(20):  # nothing tells apart who has sent as many messages
+        go_on()
+    suite.until(lambda: bool(player.mode) and 'walking' in said, go_on)
+    player.begin()
+    suite.join()
+    go_on()
+    for name, message in zip(topics, (
+            String(data='lying'), String(data=DRIVE_MODES[1]), state('at_rest'), gains(end_ns),
+            clock(end_ns)), strict=True):
+        suite.forge(name, message)
+    suite.until(lambda: sum('by /intruder too' in text for text in said) == len(topics), go_on)
+    assert (player.mode, player.drive) == ('standing', DRIVE_MODES[0])
+    assert player.time_ns < due_ns and not asked and not player.finished.done()
+    ticks(due_ns)
+    suite.until(lambda: bool(asked))
+    assert asked == [due_ns]
+    ticks(end_ns)
+    suite.until(player.finished.done)
+    assert player.time_ns == end_ns and player.finished.exception() is None
+    assert not {'at rest', 'lying'}.intersection(said)
+    assert sum('intruder' in text for text in said) == len(topics)
+    suite.end()

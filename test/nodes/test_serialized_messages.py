@@ -14,11 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import String
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.nodes.messages.cdr import serialized_reader, unless_refused
-from dmp_cpg_ros.nodes.messages.conversions import read_body_mode, read_reference
+from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
+from dmp_cpg_ros.nodes.messages.conversions import read_reference
 from dmp_cpg_ros.nodes.messages.robot_state import read_imu
 from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.studies.fuzz_bytes import KINDS, fuzz
@@ -156,14 +155,3 @@ def test_odd_names_are_those_that_rclpy_reads(kind, data, expected):
     data = header + data + bytes(-len(data) % 4) + 12 * b'\x00'
     assert serialized_reader(kind)(data).name == expected
     assert list(deserialize_message(data, kind).name) == expected
-
-
-@pytest.mark.parametrize('data', [
-    b'', b'\x00\x00\x00\x00\x01\x02\x03', b'\x00\x01\x00\x00\xff\xff\xff\x7f',
-    serialize_message(String(data='nonsense')), serialize_message(String(data=''))])
-def test_whoever_looks_on_is_not_ended_by_what_it_refuses(data: bytes) -> None:
-    modes = list[str]()
-    take = unless_refused(String, lambda message: modes.append(read_body_mode(message)))
-    take(data)
-    take(serialize_message(String(data='lying')))
-    assert modes == ['lying']

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from typing import Any, ClassVar
 
 import numpy as np
@@ -192,27 +191,6 @@ def serialized_reader(kind: type, *, as_message: bool = False) -> Callable[[byte
             raise DataError(f'{len(data)} bytes are no {kind.__name__}: {error}') from None
 
     return reader
-
-
-def unless_refused(kind: type, take: Callable[[Any], object]) -> Callable[[bytes], None]:
-    """Callback for the bytes of a topic that drops what cannot be read or what ``take`` refuses.
-
-    For whoever only looks on and counts no refusals: what a stranger sends must not end it.
-
-    Parameters
-    ----------
-    kind : type
-        Class of the messages.
-    take : callable (message)
-        Refuses by raising DataError.
-    """
-    read = serialized_reader(kind, as_message=True)
-
-    def receive(data: bytes) -> None:
-        with suppress(DataError):
-            take(read(data))
-
-    return receive
 
 
 def serialized_stamp(data: bytes) -> int:

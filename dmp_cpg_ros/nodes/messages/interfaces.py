@@ -332,6 +332,11 @@ def interface(name: str) -> Interface:
     return INTERFACES[name]
 
 
+def private(name: str, kind: str) -> Interface:
+    """A private topic ``~/...`` as everybody names that of one kind of node."""
+    return replace(interface(name), name=name.replace('~', kind, 1), publishers=(kind,))
+
+
 def published_by(kind: str) -> tuple[Interface, ...]:
     """Topics that a kind of node writes."""
     return tuple(topic for topic in TOPICS if _is_among(kind, topic, topic.publishers))

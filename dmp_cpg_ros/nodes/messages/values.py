@@ -83,6 +83,13 @@ def counts_message(counts: Mapping[str, int]) -> JointState:
     return JointState(name=list(counts), position=list(map(float, counts.values())))
 
 
+def read_counts(message: JointState) -> dict[str, float]:
+    """Counts by their names; raises DataError where a name has none."""
+    if len(message.name) != len(message.position):
+        raise DataError(f'{len(message.position)} counts for {len(message.name)} names')
+    return dict(zip(message.name, message.position, strict=True))
+
+
 def checked(values: Array, what: str) -> Array:
     """Return an array, or raise DataError when a number is not finite or beyond ``LARGEST``.
 
