@@ -94,8 +94,7 @@ class WriterWatch:
         silent = now_ns - self._heard_ns > SILENT_NS
         stranger = number is not None and number == self._stranger + 1
         if number is None or (self._continues(ahead, passed_ns, now_ns)
-                              and not (silent and stranger) and (
-                                  self._ticked or ahead == 1 or self._may_take_over())):
+                              and not (silent and stranger)):
             if ahead > 0 and (self._learned < LEARNING or passed_ns < ahead * self._tick_ns):
                 self._learned += 1
                 own_ns = passed_ns // max(1, ahead - self._repeats)
@@ -114,6 +113,8 @@ class WriterWatch:
                 self._tried = number, stamp_ns, 1 + (self._tried[2] if goes_on else 0)
                 if alone or self._lock_step or self._tried[2] >= PROVEN:
                     self._begin(number, stamp_ns, now_ns)
+                    if alone:  # whoever was one has left, or is the writer that has come back
+                        self._stranger = -1
                     return True
                 return False
         self._tried, self._stranger_ns = (0, 0, 0), now_ns
@@ -155,10 +156,13 @@ class WriterWatch:
             return False
         if not self._ticked:
             # In lock-step a latched topic begins with what was told before its reader came, of
-            # which the reader's queue keeps the newest. Where more than one publish it, a gap is
-            # no loss but somebody else's number.
-            return self._last + ahead != self._stranger + 1 and (ahead == 1 or (
-                self._stranger < 0 and (self._lock_step or ahead <= self._most_lost)))
+            # which the reader's queue keeps the newest. A gap is a loss where it cannot be one
+            # of a stranger.
+            beyond = self._last + ahead - self._stranger
+            if self._stranger < 0:
+                return self._lock_step or ahead <= self._most_lost
+            return beyond != 1 and (ahead == 1 or (
+                ahead <= self._most_lost and not 0 < beyond <= self._most_lost))
         if self._learned < LEARNING:
             return (ahead <= self._most_lost
                     and passed_ns >= (ahead - self._repeats) * SHORTEST_TICK_NS)
