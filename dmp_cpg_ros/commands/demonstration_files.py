@@ -30,7 +30,8 @@ from dmp_cpg_ros.commands.run_folder import read_json, run_context
 from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.canonical.phase import phase, phase_rate
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, MissingFileError
-from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait.body_scale import BodyScale
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper

@@ -16,7 +16,8 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.inequality import finite
-from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait.body_scale import BodyScale
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait
@@ -46,7 +47,7 @@ class Page:
     gaits : mapping of str to mapping
         Gaits as in ``gaits.yaml``.
     scale : mapping of str to float
-        Fields of :class:`~dmp_cpg_ros.core.gait.gait.BodyScale`.
+        Fields of :class:`~dmp_cpg_ros.core.gait.body_scale.BodyScale`.
     tick_s : float
         Control tick [s].
     """

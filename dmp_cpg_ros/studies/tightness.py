@@ -26,7 +26,7 @@ from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates import certify, step
 from dmp_cpg_ros.core.contraction import capture, heterogeneity, inhibited, synchronisation, voting
-from dmp_cpg_ros.core.gait.gait import BodyScale
+from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import RunningGait

@@ -27,7 +27,8 @@ from dmp_cpg_ros.core.certificates.timing import later_arming
 from dmp_cpg_ros.core.contraction.capture import RADIUS_TOLERANCE, capture_set
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, inhibited_contraction
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait.body_scale import BodyScale
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.entry import eligible_legs
 from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow

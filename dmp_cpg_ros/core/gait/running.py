@@ -38,7 +38,8 @@ from dmp_cpg_ros.core.canonical.inhibition import (
 from dmp_cpg_ros.core.canonical.phase import turned
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait import contact_feedback as contacts
-from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait.body_scale import BodyScale
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import AT_REST, CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.transition import (

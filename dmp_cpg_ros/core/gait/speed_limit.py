@@ -58,7 +58,7 @@ def within_limit(velocity: Triple, speed: float, most: float, tightest: float = 
         v_x, v_y [m/s], γ [rad/s].
     speed : float
         The foot speed that goes with it, as from
-        :meth:`~dmp_cpg_ros.core.gait.gait.BodyScale.foot_speed`, in proportion to it.
+        :meth:`~dmp_cpg_ros.core.gait.body_scale.BodyScale.foot_speed`, in proportion to it.
     most : float
         Highest foot speed, in the same unit.
     tightest : float, optional

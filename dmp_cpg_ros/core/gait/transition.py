@@ -49,8 +49,9 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.phase import wrapped
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.com_height import Bounce
-from dmp_cpg_ros.core.gait.gait import BodyScale, CycleOfLegs, Gait
+from dmp_cpg_ros.core.gait.gait import CycleOfLegs, Gait
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.parameters import Parameters, parameter
@@ -112,8 +113,8 @@ class GaitTransition:
         """Choose the arcs."""
         before, after = self.before, self.after
         middle = [float(np.median(gait.duty_factor)) for gait in (before, after)]
-        arcs = _arcs((before.rest - before.lag).tobytes(), (after.rest - after.lag).tobytes(),
-                     *middle)
+        places = [(gait.rest - gait.lag).tobytes() for gait in (before, after)]
+        arcs = _arcs(*places, *middle)
         rest_arc = (after.rest - before.rest + 0.5) % 1.0 - 0.5
         moves = arcs - arcs[0] + round(float(before.lag[0] - after.lag[0]), 12)
         vars(self).update(arcs=arcs, rest_arc=rest_arc, offset_arcs=moves)
@@ -227,8 +228,7 @@ class BlendedGait(CycleOfLegs):
         return following, 2.0 * np.pi * transition.common_arc * (weight - self.weight)
 
     def oscillator_omegas(self, omega: float) -> Array:
-        """Frequencies of the oscillators when the gait's is ω, with what moves the offsets
-        [rad/s].
+        """Frequencies of the oscillators when the gait's is ω, offsets that move included [rad/s].
         """
         omega = omega + self.turning * self.transition.common_arc
         return omega + self.turning * self.transition.offset_arcs

@@ -27,7 +27,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import hypot, pi, sqrt
 
-from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait.body_scale import BodyScale
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Pair

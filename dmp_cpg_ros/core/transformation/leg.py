@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rate
+from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.contact_feedback import LOADED, quarter_weight
-from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, minus, moved, pair, plus, triple

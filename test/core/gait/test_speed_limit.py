@@ -18,7 +18,8 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.gait import BACKWARD_WEIGHT, ONE_SIDED_WEIGHT, BodyScale, Gait
+from dmp_cpg_ros.core.gait.body_scale import BodyScale
+from dmp_cpg_ros.core.gait.gait import BACKWARD_WEIGHT, ONE_SIDED_WEIGHT, Gait
 from dmp_cpg_ros.core.gait.running import HASTE, GaitChoiceParameters, limiting_gaits
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit, swing_acceleration, within_limit
 from dmp_cpg_ros.core.gait.transition import (
