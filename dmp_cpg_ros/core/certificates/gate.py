@@ -102,8 +102,7 @@ class Running:
         wanted = self.parameters.canonical.cadence_scale
         here, there = (wanted if running.acting_cadence is None else running.acting_cadence
                        for running in (self, other))
-        return (self.settled == other.settled
-                and min(here, wanted) <= there <= max(here, wanted))
+        return self.settled == other.settled and min(here, wanted) <= there <= max(here, wanted)
 
     @property
     def _of_certificate(self) -> Running:

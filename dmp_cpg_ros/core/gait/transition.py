@@ -228,8 +228,7 @@ class BlendedGait(CycleOfLegs):
         return following, 2.0 * np.pi * transition.common_arc * (weight - self.weight)
 
     def oscillator_omegas(self, omega: float) -> Array:
-        """Frequencies of the oscillators when the gait's is ω, offsets that move included [rad/s].
-        """
+        """Frequencies of the oscillators when the gait's is ω, with moving offsets [rad/s]."""
         omega = omega + self.turning * self.transition.common_arc
         return omega + self.turning * self.transition.offset_arcs
 
