@@ -136,10 +136,10 @@ def _votes(p: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale, tick_s: 
 
 @lru_cache(maxsize=32)
 def _votes_in(p: SuiteParameters, gait: Gait, scale: BodyScale, tick_s: float, cadence: float
-              ) -> list[Inequality]:
+              ) -> tuple[Inequality, ...]:
     """Of one gait at one cadence: what moves to a cadence and what has come there share it."""
     network = GaitNetwork(replace(p.canonical, cadence_scale=cadence), gait, scale)
-    return vote_inequalities(Setting.of(network, p, tick_s))
+    return tuple(vote_inequalities(Setting.of(network, p, tick_s)))
 
 
 def _changed(row: Inequality, bound: float, leg: LegParameters, what: str) -> Inequality:

@@ -65,8 +65,8 @@ def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array, gains: 
     gains : ndarray (N,)
         Inhibition gains α_i that act [1/s].
     near : ndarray (N, 2), optional
-        Stable equilibrium under gains that are not very different: the one that grows out of it
-        is taken where it is stable, too, at a third of the cost.
+        Stable equilibrium under gains that are not very different: Newton's method begins there,
+        and on the way from the resting targets only where it finds no stable one.
 
     Returns
     -------

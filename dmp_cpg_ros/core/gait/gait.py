@@ -36,7 +36,7 @@ of one that stands on one side only.
 """
 
 WIDE_STANCE = 0.75
-"""Share of stance on both sides from which on a gait counts as standing on both."""
+"""Share of stance on both sides, or ends, from which on a gait counts as standing on both."""
 
 
 class Pace(NamedTuple):
@@ -231,13 +231,13 @@ class Gait(CycleOfLegs):
              f'{self.highest_speed:g}')):
             if not holds:
                 raise ParameterError(f"gait '{self.name}': {rule}")
-        together = [stand_together(lag, float(self.duty_factor.min()), parts)
-                    for parts in (SIDES, ENDS)]
+        two_sided, two_ended = (stand_together(lag, float(self.duty_factor.min()), parts)
+                                for parts in (SIDES, ENDS))
         vars(self).update(
             rest=rest_phase(lag), phases=-2.0 * np.pi * lag, groups=stance_groups(lag),
             apart=float(stance_groups(lag) != 1), steps=len(np.unique(np.round(lag % 1.0, 9))),
-            two_sided=together[0], firm=float(
-                stance_groups(lag) != 1 and min(together) >= WIDE_STANCE),
+            two_sided=two_sided, firm=float(
+                stance_groups(lag) != 1 and min(two_sided, two_ended) >= WIDE_STANCE),
             _tables=tuple(table.tolist() for table in tables),
             _nominal=self.cadence.tolist(), _highest=(inf, self.highest_speed))
 

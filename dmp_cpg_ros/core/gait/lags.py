@@ -10,6 +10,9 @@ import numpy as np
 
 from dmp_cpg_ros.core.maths import Array
 
+SIDES, ENDS = ((0, 2), (1, 3)), ((0, 1), (2, 3))
+"""Legs of the two sides, and of the front and the hind end."""
+
 
 def stance_groups(lag: Array) -> int:
     """Number of groups of legs that stand in turn, evenly over the cycle; 0 where it is uneven.
@@ -43,10 +46,6 @@ def rest_phase(lag: Array) -> float:
     return float(min(middles[own > own.max() - 1e-6]))
 
 
-SIDES, ENDS = ((0, 2), (1, 3)), ((0, 1), (2, 3))
-"""Legs of the two sides, and of the front and the hind end."""
-
-
 def stand_together(lag: Array, duty: float, parts: Sequence[Sequence[int]], grid: int = 400
                    ) -> float:
     """Share of the stance of some foot in which feet of both parts of the legs stand.
@@ -61,6 +60,11 @@ def stand_together(lag: Array, duty: float, parts: Sequence[Sequence[int]], grid
         ``SIDES`` or ``ENDS``.
     grid : int
         Number of phases that are looked at.
+
+    Returns
+    -------
+    float
+        In [0, 1]; 0 where no foot stands.
     """
     at = (np.arange(grid)[:, None] / grid - lag + 0.5) % 1.0 - 0.5
     one, other = (np.any((np.abs(at) > 0.5 * (1.0 - duty))[:, list(legs)], axis=1)

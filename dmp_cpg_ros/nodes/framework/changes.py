@@ -41,6 +41,7 @@ class ParameterChanges:
     """
 
     def __init__(self, node: SuiteNode) -> None:
+        """Declare the parameters, and take what is asked of them."""
         self._node, self._table = node, node.parameter_table()
         self.accepted: Sets = parameters.declare(node, self._table)
         self.following = False

@@ -31,6 +31,7 @@ class GaitMemory:
     """
 
     def __init__(self, node: SuiteNode, gaits: KnownGaits) -> None:
+        """Listen."""
         self._node, self._reader = node, GaitMemoryReader(gaits)
         self._kept: deque[Any] = deque(maxlen=1)
         self._heard = node.listen('gait_memory', self._kept.append)
