@@ -14,6 +14,7 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.lags import ENDS, SIDES, stand_together
+from dmp_cpg_ros.core.gait.transition import GaitTransition
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.suite import load_gait
@@ -119,6 +120,13 @@ def test_foot_speed_bounds_the_speed_of_every_foot(
 def test_impossible_gaits_are_refused(changes: dict[str, object], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         made(**changes)
+
+
+def test_what_stands_on_one_side_or_one_end_alone_or_swings_as_one_is_not_firm() -> None:
+    assert {name for name, gait in GAITS.items() if gait.firm == 1.0} == {'amble', 'walk', 'trot'}
+    assert all(gait.firm in (0.0, 1.0) for gait in GAITS.values())
+    way = GaitTransition(GAITS['trot'], GAITS['pace'])
+    assert [way.at(share, 0.1).firm for share in (0.0, 0.5, 1.0)] == [1.0, 0.5, 0.0]
 
 
 def test_feet_that_hardly_ever_stand_share_no_stance() -> None:
