@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from limbless import NO_FEEDBACK
-from test_core_supervisor import ROBOT, TICK, Run, walking
+from standing_run import ROBOT, TICK, Run, walking
 from test_push_recovery import ahead
 
 from dmp_cpg_ros.core.balance.controller import (

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from limbless import NO_FEEDBACK
-from test_core_supervisor import ROBOT, TICK, Run, walking
+from standing_run import ROBOT, TICK, Run, walking
 
 from dmp_cpg_ros.core.balance.capture_point import WIDE
 from dmp_cpg_ros.core.balance.controller import (

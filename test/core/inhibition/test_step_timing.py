@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_core_supervisor import TICK, Run, walking
+from standing_run import TICK, Run, walking
 from test_push_recovery import TO_THE_LEFT, resting, told
 
 from dmp_cpg_ros.core.balance.capture_point import WIDE

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from core_examples import GAITS, TICK, TICK_NS, network
-from test_core_supervisor import Run, walking
+from standing_run import Run, walking
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify
