@@ -42,6 +42,16 @@ events:
   - {at: 4.4, inhibit: false}
 """
 
+IN_REAL_TIME = """\
+name: in_real_time
+duration: 6.0
+events:
+  - {at: 0.2, inhibit: false}
+  - {at: 0.2, command: {v_x: 0.5, gamma: 0.1}}
+  - {at: 1.5, inhibit: true}    # heard late on a busy machine, and then the body may step first
+  - {at: 5.5, inhibit: false}
+"""
+
 ON_BLOCKS = """\
 name: blocks
 duration: 2.0
@@ -205,17 +215,16 @@ def test_contacts_reach_the_nodes_at_the_tick_at_which_they_are_measured(
     assert any(np.any(a.x_dot != b.x_dot) for a, b in zip(ticks, without, strict=True))
 
 
-def test_real_time_run_stops_and_starts(
-    processes: Processes, scenario: Path, tmp_path: Path
-) -> None:
-    run = processes.walked(scenario, tmp_path / 'run', '--composed')
+def test_real_time_run_stops_and_starts(processes: Processes, tmp_path: Path) -> None:
+    run = processes.walked(IN_REAL_TIME, tmp_path / 'run', '--composed')
     _, end = load_recording(run / 'bag').span
     with opened(run / 'bag') as reader:
         # When the recorder ends, another topic of the robot may be a tick ahead of the joints.
         assert reader.start_time >= 0 and reader.end_time <= end * 1e9 + TICK_NS + 1
     metrics = json.loads((run / 'metrics.json').read_text(encoding='utf-8'))
     assert metrics['robot']['fell'] is False
-    assert metrics['stop']['completed'] == 1
+    # A robot whose controllers starve may have stood by itself before.
+    assert metrics['stop']['completed'] >= 1 and metrics['start']['completed'] >= 1
     for name in (
         'rate_hz',
         'real_time_factor',
