@@ -23,7 +23,6 @@ from typing import Any
 
 import numpy as np
 import rclpy
-from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.callback_groups import CallbackGroup
 from rclpy.parameter import Parameter, parameter_value_to_python
@@ -51,8 +50,12 @@ from dmp_cpg_ros.nodes.framework.parameters import (
     ParameterTable,
     plain,
 )
-from dmp_cpg_ros.nodes.messages import conversions
+from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader
+from dmp_cpg_ros.nodes.messages.commands import push_force, twist
+from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, interface
+from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
+from dmp_cpg_ros.nodes.messages.reference import read_reference
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, JointsReader, read_odom
 from dmp_cpg_ros.nodes.messages.values import checked_numbers, header_ns
 from dmp_cpg_ros.robot.robot_file import load_robot_file
@@ -164,8 +167,8 @@ class LiveView:
         joints = JointsReader(self._joint_names)
         readers: dict[str, Callable[[Any], Any]] = {
             'joint_states': lambda message: (header_ns(message), joints.read(message)[0]),
-            'canonical_state': conversions.CanonicalStateReader(gaits).read,
-            'reference': conversions.read_reference,
+            'canonical_state': CanonicalStateReader(gaits).read,
+            'reference': read_reference,
             'foot_contacts': FootContactsReader().read}
         heard = OwnMessages(self._node, self._node.get_logger().warning,
                             lock_step=not self.drives)
@@ -176,7 +179,7 @@ class LiveView:
                 topic.type, name, lambda _: None, newest, callback_group=group)
             self._polled.append((name, subscription, heard.admitting(topic),
                                  readers.get(name, read_odom)))
-        gains = conversions.InhibitionGainsReader()
+        gains = InhibitionGainsReader()
 
         def hear_gains(message: Any) -> None:
             self._values['inhibition_gains'] = gains.read(message)
@@ -256,10 +259,7 @@ class LiveView:
             self._drive(value)
             answer.set_result((True, ''))
         elif name == 'push':
-            message = WrenchStamped()
-            message.header.frame_id, force = 'world', message.wrench.force
-            force.x, force.y, force.z = value
-            self._pushes.publish(message)
+            self._pushes.publish(push_force(value, 'world'))
             answer.set_result((True, ''))
         elif name == 'gait':
             change = Parameter('gait', value=value).to_parameter_msg()
@@ -281,11 +281,9 @@ class LiveView:
         client.call_async(request).add_done_callback(answered)
 
     def _drive(self, velocity: Sequence[float]) -> None:
-        message = self._velocity_type()
+        message = twist(self._velocity_type, velocity)
         if hasattr(message, 'header'):
             message.header.stamp = self._node.get_clock().now().to_msg()
-        twist = getattr(message, 'twist', message)
-        twist.linear.x, twist.linear.y, twist.angular.z = velocity
         self._velocity.publish(message)
 
     # Frames --------------------------------------------------------------------------------------
@@ -359,11 +357,11 @@ class LiveView:
         return round((stamp_ns - first_ns) * 1e-9 / (now - begin), 3) if now > begin else 0.0
 
     def _hear_stop(self, message: Any) -> None:
-        word, values = conversions.read_state_word(message), message.status[0].values
+        word, values = read_state_word(message), message.status[0].values
         self._stop = {entry.key: entry.value for entry in values} | {'state': word}
 
     def _hear_mode(self, message: Any) -> None:
-        self._mode = conversions.read_body_mode(message)
+        self._mode = read_body_mode(message)
 
 
 def _rounded(values: Any) -> Any:

@@ -15,7 +15,6 @@ from typing import Any
 
 import rclpy
 import yaml
-from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.parameter import Parameter, get_parameter_value, parameter_value_to_python
 from std_srvs.srv import SetBool, Trigger
@@ -32,6 +31,7 @@ from dmp_cpg_ros.commands.teleop import AXES, HELD, drive, steer
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.nodes.framework.parameters import plain
+from dmp_cpg_ros.nodes.messages.commands import push_force
 from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, TOPICS, interface
 from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
 
@@ -80,11 +80,8 @@ def publish_command(client: SuiteClient, options: argparse.Namespace) -> None:
 
 def push(client: SuiteClient, options: argparse.Namespace) -> None:
     """Push the simulated robot."""
-    message = WrenchStamped()
-    vector = message.wrench.force
-    vector.x, vector.y, vector.z = options.force
     publisher = client.publisher(interface('push'))
-    publisher.publish(message)
+    publisher.publish(push_force(options.force))
     deliver(publisher)
 
 

@@ -26,6 +26,7 @@ from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
+from dmp_cpg_ros.nodes.messages.commands import twist
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, Interface, interface
 
 ASK_AGAIN_S = 0.3
@@ -205,10 +206,7 @@ def velocity_command(client: SuiteClient, *, stamped: bool
     publisher = client.publisher(topic)
 
     def publish(velocity: Sequence[float]) -> None:
-        message = topic.type()
-        twist = getattr(message, 'twist', message)
-        twist.linear.x, twist.linear.y, twist.angular.z = velocity
-        publisher.publish(message)
+        publisher.publish(twist(topic.type, velocity))
 
     def send(velocity: Sequence[float]) -> None:
         if not publisher.get_subscription_count():

@@ -30,8 +30,8 @@ from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.nodes.framework import claims, execution, health
-from dmp_cpg_ros.nodes.messages.conversions import DRIVE_MODES
 from dmp_cpg_ros.nodes.messages.interfaces import private
+from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
 from dmp_cpg_ros.suite_table import (
     COMPOSED,

@@ -21,7 +21,7 @@ from dmp_cpg_ros.commands.joystick import Joystick
 from dmp_cpg_ros.commands.suite_client import ClientError, SuiteClient, velocity_command
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.nodes.framework.own_messages import OwnMessages
-from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, read_state_word
+from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 
 STILL = (0.0, 0.0, 0.0)

@@ -35,8 +35,10 @@ from dmp_cpg_ros.nodes.framework.gait_memory import GaitMemory
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
 from dmp_cpg_ros.nodes.framework.known_stop import KnownStop
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages import conversions
+from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateWriter
+from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
+from dmp_cpg_ros.nodes.messages.reference import read_reference
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader
 from dmp_cpg_ros.nodes.messages.values import stamped, told_at
 
@@ -71,12 +73,12 @@ class CanonicalOscillators(SuiteNode):
         self._known = KnownStop(self, 'acting_gains')
         self._watch = PhaseLockWatch()
         self._lock: PhaseLock | None = None
-        self._writer = conversions.CanonicalStateWriter(tuple(gaits.gaits))
+        self._writer = CanonicalStateWriter(tuple(gaits.gaits))
         self._publisher = self.publisher('canonical_state')
         feedback = self.parameters_of(CanonicalParameters).contact_feedback
         contacts = {'foot_contacts': stamped(FootContactsReader().read)} if feedback else {}
-        self.match('reference', {'reference': conversions.read_reference, **contacts},
-                   delayed={'inhibition_gains': stamped(conversions.InhibitionGainsReader().read)},
+        self.match('reference', {'reference': read_reference, **contacts},
+                   delayed={'inhibition_gains': stamped(InhibitionGainsReader().read)},
                    optional=contacts)
         self._memory = GaitMemory(self, gaits)
 

@@ -42,12 +42,17 @@ from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, cer
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
 from dmp_cpg_ros.nodes.framework.known_stop import OthersKnow
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages import conversions
+from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader, GaitMemoryWriter
+from dmp_cpg_ros.nodes.messages.commands import read_votes
+from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsWriter, inhibition_state
 from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES, read_drive_mode
+from dmp_cpg_ros.nodes.messages.posture_feedback import BodyReader
+from dmp_cpg_ros.nodes.messages.reference import read_reference
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, read_imu
 from dmp_cpg_ros.nodes.messages.values import Array, stamp_ns, stamped
 
-FOLLOWING = conversions.DRIVE_MODES[0]
+FOLLOWING = DRIVE_MODES[0]
 
 HEARTBEAT_NS = 100_000_000
 """Time after which the gains are told again although they are the same [ns]."""
@@ -95,26 +100,26 @@ class InhibitionNode(SuiteNode):
         self._held: tuple[int, dict[str, Any]] | None = None
         self._told: tuple[Any, ...] = ()
         self._publisher = self.publisher('inhibition_state')
-        self._gains_writer = conversions.InhibitionGainsWriter()
+        self._gains_writer = InhibitionGainsWriter()
         self._gains_publisher = self.publisher('inhibition_gains')
         self._others = OthersKnow(self, self._take_up)
         self.listen('drive_mode', self._on_drive)
         if self.lock_step:
-            self._memory_writer = conversions.GaitMemoryWriter(tuple(gaits.gaits))
+            self._memory_writer = GaitMemoryWriter(tuple(gaits.gaits))
             self._memory = self.publisher('gait_memory')
             self.look_every(JOIN_EVERY_S, self._try_again)
         else:
             self.listen('/clock', lambda message: self._watch(stamp_ns(message.clock)))
-        body, sensors = conversions.BodyReader(), {}
+        body, sensors = BodyReader(), {}
         if self._voting.voting.voting:
             sensors = {'foot_contacts': stamped(FootContactsReader().read),
                        'imu': stamped(read_imu)}
-            self.listen('votes', command=True, callback=lambda message: self._inbox.accept(
-                *conversions.read_votes(message)))
+            self.listen('votes', lambda message: self._inbox.accept(*read_votes(message)),
+                        command=True)
         mode = {'posture_feedback': body.read}
         self.match('canonical_state', {
-            'canonical_state': conversions.CanonicalStateReader(gaits).read,
-            'reference': conversions.read_reference,
+            'canonical_state': CanonicalStateReader(gaits).read,
+            'reference': read_reference,
             **sensors,
             **(mode if self.lock_step else {}),
         }, delayed={} if self.lock_step else mode, optional=sensors, last='posture_feedback')
@@ -247,7 +252,7 @@ class InhibitionNode(SuiteNode):
 
     def _on_drive(self, message: Any) -> None:
         """Stop the gait at once while the robot does not follow the legs."""
-        self._drive = conversions.read_drive_mode(message)
+        self._drive = read_drive_mode(message)
         if self._drive != FOLLOWING and self._joined:
             self._stop_now()
 
@@ -406,7 +411,7 @@ class InhibitionNode(SuiteNode):
         if self._voting.voting.voting:
             told |= {**_by_leg('vote', state.tally.weights), 'voted': state.voted,
                      'asked': state.asked, 'cause': state.tally.cause}
-        self._publisher.publish(conversions.inhibition_state(state.time_ns, state.state, told))
+        self._publisher.publish(inhibition_state(state.time_ns, state.state, told))
 
 
 def _by_leg(what: str, numbers: Array) -> dict[str, float]:

@@ -16,7 +16,10 @@ from dmp_cpg_ros.core.suite_parameters import LegChoice
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known_gaits
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages import conversions
+from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader
+from dmp_cpg_ros.nodes.messages.joint_targets import JointTargetsWriter
+from dmp_cpg_ros.nodes.messages.posture_feedback import PostureFeedbackReader
+from dmp_cpg_ros.nodes.messages.reference import read_reference
 from dmp_cpg_ros.nodes.messages.robot_state import JointsReader
 from dmp_cpg_ros.nodes.messages.values import stamped
 from dmp_cpg_ros.primitive_files import load_motion
@@ -50,12 +53,12 @@ class LegTransformation(SuiteNode):
         self._leg = LegControl(
             leg, description, parameters, Movements(description), load_motion(parameters.motion))
         self._state, self._joined = self._leg.initial_state(), False
-        self._writer = conversions.JointTargetsWriter(leg, description.joint_names)
+        self._writer = JointTargetsWriter(leg, description.joint_names)
         self._publisher = self.publisher('joint_targets')
         readers: dict[str, Callable[[Any], Any]] = {
-            'canonical_state': conversions.CanonicalStateReader(gaits).read,
-            'reference': conversions.read_reference,
-            'posture_feedback': stamped(conversions.PostureFeedbackReader().read),
+            'canonical_state': CanonicalStateReader(gaits).read,
+            'reference': read_reference,
+            'posture_feedback': stamped(PostureFeedbackReader().read),
         }
         if parameters.reading == 'torque':
             readers['joint_states'] = JointsReader(description.joint_names).read

@@ -30,8 +30,9 @@ from dmp_cpg_ros.nodes.framework.certified import Sets
 from dmp_cpg_ros.nodes.framework.driven_robot import DrivenRobot
 from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers
 from dmp_cpg_ros.nodes.framework.parameters import NodeParameters
-from dmp_cpg_ros.nodes.messages import conversions
+from dmp_cpg_ros.nodes.messages.commands import read_push_force
 from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS, Interface
+from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
 from dmp_cpg_ros.nodes.messages.robot_state import RobotStateWriter
 from dmp_cpg_ros.nodes.messages.values import set_stamp, stamp_ns
 from dmp_cpg_ros.robot.model_reader import load_description
@@ -224,7 +225,7 @@ class MujocoRobotNode(DrivenRobot):
 
     def _on_body_mode(self, message: Any) -> None:
         """Know when lying is no fall; a fall is over when the robot stands again."""
-        mode = conversions.read_body_mode(message)
+        mode = read_body_mode(message)
         if mode == 'standing' and self._body_mode != 'standing':
             self._fell = False
             self.clear('fell')
@@ -247,7 +248,7 @@ class MujocoRobotNode(DrivenRobot):
             self._hold()
 
     def _on_push(self, message: Any) -> None:
-        force, take = conversions.read_push_force(message), getattr(self._robot, 'take_push', None)
+        force, take = read_push_force(message), getattr(self._robot, 'take_push', None)
         if take is None:
             raise DataError(f'physics: {self._options.physics} knows no forces; '
                             'physics: mujoco does')

@@ -34,8 +34,12 @@ from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known_gaits
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages import conversions, robot_state
+from dmp_cpg_ros.nodes.messages import robot_state
+from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader
 from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS, interface
+from dmp_cpg_ros.nodes.messages.joint_targets import read_drive_mode
+from dmp_cpg_ros.nodes.messages.posture_feedback import PostureFeedbackWriter
+from dmp_cpg_ros.nodes.messages.reference import read_reference
 from dmp_cpg_ros.nodes.messages.transforms import WITHOUT_TF, TransformWriter
 from dmp_cpg_ros.nodes.messages.values import stamped, told_at
 from dmp_cpg_ros.suite_table import POSTURE
@@ -188,7 +192,7 @@ class PostureControl(SuiteNode):
 
     def configure(self) -> None:
         """Build the controller and its topics."""
-        canonical = conversions.CanonicalStateReader(known_gaits(self))
+        canonical = CanonicalStateReader(known_gaits(self))
         description = description_of(self)
         legs = RobotLegs(description)
         self._body = BodyState(self, description, legs)
@@ -198,11 +202,11 @@ class PostureControl(SuiteNode):
         self._state, self._told = self._control.initial_state(), ''
         self._joined = False
         self._mode_publisher = self.publisher('body_mode')
-        self._writer = conversions.PostureFeedbackWriter()
+        self._writer = PostureFeedbackWriter()
         self._publisher = self.publisher('posture_feedback')
         self.match('canonical_state', {
             **self._body.readers,
-            'reference': conversions.read_reference,
+            'reference': read_reference,
             'canonical_state': canonical.read,
         }, optional=self._body.optional)
         self.listen('drive_mode', self._on_drive)
@@ -251,7 +255,7 @@ class PostureControl(SuiteNode):
 
     def _on_drive(self, message: Any) -> None:
         self._state = self._control.told_drive(
-            self._state, conversions.read_drive_mode(message))
+            self._state, read_drive_mode(message))
 
     def _tell(self) -> None:
         """Publish and log a new mode; a fall is an error until it is over."""

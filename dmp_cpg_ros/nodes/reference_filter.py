@@ -18,8 +18,9 @@ from dmp_cpg_ros.core.suite_parameters import REFERENCE
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified
 from dmp_cpg_ros.nodes.framework.gait_memory import GaitMemory
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, ReferenceWriter
+from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
+from dmp_cpg_ros.nodes.messages.reference import ReferenceWriter
 from dmp_cpg_ros.nodes.messages.values import stamped
 
 

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Twist, WrenchStamped
+from geometry_msgs.msg import Twist
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
@@ -30,13 +30,11 @@ from dmp_cpg_ros.core.scenario.scenario import Action, Command, Scenario
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
 from dmp_cpg_ros.nodes.framework.own_messages import OwnMessages
 from dmp_cpg_ros.nodes.framework.parameters import plain
-from dmp_cpg_ros.nodes.messages.conversions import (
-    DRIVE_MODES,
-    read_body_mode,
-    read_drive_mode,
-    read_state_word,
-)
+from dmp_cpg_ros.nodes.messages.commands import push_force, twist
+from dmp_cpg_ros.nodes.messages.inhibition import read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, interface, private
+from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES, read_drive_mode
+from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
 from dmp_cpg_ros.nodes.messages.values import header_ns, read_counts, set_stamp, stamp_ns
 
 FAR_NS = 2**31 * 10**9 - 1
@@ -386,21 +384,13 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             self._hand_over(action)
 
     def _send(self, command: Command) -> None:
-        message = Twist()
-        message.linear.x, message.linear.y, message.angular.z = command
-        self._publish('cmd_vel', message)
+        self._publish('cmd_vel', twist(Twist, command))
 
     def _push(self, push: Push) -> None:
         """Send the push's forces at once; the robot applies each at its stamp."""
-        start_ns, messages = self.time_ns if self._lock_step else self.time_ns + LEAD_NS, []
-        for force in push.forces(start_ns, self._tick_ns):
-            message = WrenchStamped()
-            set_stamp(message.header.stamp, force.time_ns)
-            message.header.frame_id = force.frame
-            vector = message.wrench.force
-            vector.x, vector.y, vector.z = force.force
-            messages.append(message)
-        self._publish('push', *messages)
+        start_ns = self.time_ns if self._lock_step else self.time_ns + LEAD_NS
+        self._publish('push', *(push_force(force.force, force.frame, force.time_ns)
+                                for force in push.forces(start_ns, self._tick_ns)))
 
     def _vote(self, weights: dict[str, float]) -> None:
         self._publish('votes', JointState(

@@ -27,10 +27,13 @@ from dmp_cpg_ros.core.transformation.preview import rest_of_swing
 from dmp_cpg_ros.nodes.framework.gaits import description_of, known_gaits
 from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages import conversions, robot_state
+from dmp_cpg_ros.nodes.messages import robot_state
+from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.markers import FootMarkers
+from dmp_cpg_ros.nodes.messages.posture_feedback import PostureFeedbackReader
+from dmp_cpg_ros.nodes.messages.reference import read_reference
 from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamped
 from dmp_cpg_ros.primitive_files import load_motion
 from dmp_cpg_ros.suite_table import KINDS, VISUALIZATION
@@ -70,9 +73,9 @@ class Visualization(SuiteNode):
         self._drawn, self._stamp_ns, self._place = 0, -1, np.zeros(3)
         self._bytes: dict[str, bytes] = {}
         readers: dict[str, Callable[[Any], Any]] = {
-            'posture_feedback': stamped(conversions.PostureFeedbackReader().read),
-            'canonical_state': conversions.CanonicalStateReader(known_gaits(self)).read,
-            'reference': conversions.read_reference,
+            'posture_feedback': stamped(PostureFeedbackReader().read),
+            'canonical_state': CanonicalStateReader(known_gaits(self)).read,
+            'reference': read_reference,
             'odom': stamped(robot_state.read_odom)}
         self._readers = {name: _of_bytes(serialized_reader(interface(name).type), read)
                          for name, read in readers.items()}

@@ -36,8 +36,12 @@ from dmp_cpg_ros.core.inhibition.prediction import look_ahead
 from dmp_cpg_ros.core.loop import Array, WalkingLoop
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.transformation.leg import LegFeedback
-from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
+from dmp_cpg_ros.nodes.messages.posture_feedback import (
+    PostureFeedbackReader,
+    PostureFeedbackWriter,
+)
+from dmp_cpg_ros.nodes.messages.reference import ReferenceWriter, read_reference
 from dmp_cpg_ros.paper import network as networks
 from dmp_cpg_ros.paper.oscillators import HopfOscillators
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
@@ -212,14 +216,14 @@ def _walking(overrides: Mapping[str, object] | None = None) -> tuple[Suite, Loop
 
 def messages() -> list[Row]:
     """Reading and writing by the suite, rclpy and rosbags; and what one message more costs."""
-    writer, reader = conversions.PostureFeedbackWriter(), conversions.PostureFeedbackReader()
+    writer, reader = PostureFeedbackWriter(), PostureFeedbackReader()
     feedback = PostureFeedback(np.ones(12), np.ones((4, 3)), np.ones((4, 2)), np.ones(3))
     data, read = writer.fill(0, feedback).serialized, serialized_reader(JointState)
     message, store = deserialize_message(data, JointState), get_typestore(Stores.ROS2_JAZZY)
     kind, twist_kind = (f'{of.__module__.split(".")[0]}/msg/{of.__name__}'
                         for of in (JointState, TwistStamped))
     other, read_twist = store.deserialize_cdr(data, kind), serialized_reader(TwistStamped)
-    twist = conversions.ReferenceWriter().fill(0, np.ones(3)).serialized
+    twist = ReferenceWriter().fill(0, np.ones(3)).serialized
     with rclpy.context.Context() as context:
         node = rclpy.create_node('bench', context=context, enable_rosout=False)
         publisher = node.create_publisher(JointState, 'bench', 10)
@@ -249,8 +253,8 @@ def messages() -> list[Row]:
             ('write and publish posture_feedback', lambda: publisher.publish(
                 writer.fill(0, feedback).serialized)),
             ('fill and publish it by rclpy', fill_by_rclpy),
-            ('read reference', lambda: conversions.read_reference(read_twist(twist))),
-            ('the same by rclpy', lambda: conversions.read_reference(
+            ('read reference', lambda: read_reference(read_twist(twist))),
+            ('the same by rclpy', lambda: read_reference(
                 deserialize_message(twist, TwistStamped))),
             ('the same by rosbags', lambda: store.deserialize_cdr(twist, twist_kind)),
             ('deliver one message to four readers', deliver),

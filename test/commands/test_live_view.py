@@ -33,8 +33,8 @@ from ros_processes import (
 )
 
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
 from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
 
 shared_domain, suite, ros = (
     ros_processes.shared_domain, ros_processes.shared_suite, ros_processes.shared_ros)

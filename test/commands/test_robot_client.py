@@ -31,14 +31,10 @@ from dmp_cpg_ros.commands.joystick import AXIS, BUTTON, EVENT, FULL, INITIAL
 from dmp_cpg_ros.commands.teleop import AXES, HELD
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.layouts import GAIN_ROWS
-from dmp_cpg_ros.nodes.messages.conversions import (
-    DRIVE_MODES,
-    InhibitionGainsReader,
-    read_body_mode,
-    read_drive_mode,
-    read_state_word,
-)
+from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES, read_drive_mode
+from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
 from dmp_cpg_ros.suite_table import WALKING_NODES
 
 shared_domain, shared_suite, ros = (

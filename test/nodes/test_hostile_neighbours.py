@@ -20,7 +20,7 @@ import pytest
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.layouts import GAIN_ROWS
-from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader
+from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader
 
 pytest.importorskip('rclpy')
 
@@ -54,7 +54,7 @@ from dmp_cpg_ros.nodes.framework.gaits import follow_gait, known_gaits
 from dmp_cpg_ros.nodes.framework.writer_watch import SILENT_NS
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
-from dmp_cpg_ros.nodes.messages.conversions import read_push_force
+from dmp_cpg_ros.nodes.messages.commands import read_push_force
 from dmp_cpg_ros.nodes.messages.interfaces import Interface, interface, published_by, read_by
 from dmp_cpg_ros.nodes.messages.robot_state import read_imu
 from dmp_cpg_ros.nodes.messages.values import set_stamp

@@ -28,24 +28,24 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.inhibition.blocked import Progress
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, JointTargets, RobotState
+from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader
 from dmp_cpg_ros.nodes.messages.cdr import Serialized
-from dmp_cpg_ros.nodes.messages.conversions import (
-    BodyReader,
-    CanonicalStateReader,
-    CommandReader,
+from dmp_cpg_ros.nodes.messages.commands import read_twist
+from dmp_cpg_ros.nodes.messages.inhibition import (
     InhibitionGainsReader,
     InhibitionGainsWriter,
-    JointTargetsReader,
-    JointTargetsWriter,
+    inhibition_state,
+    read_state_word,
+)
+from dmp_cpg_ros.nodes.messages.joint_targets import JointTargetsReader, JointTargetsWriter
+from dmp_cpg_ros.nodes.messages.posture_feedback import (
+    BodyReader,
+    CommandReader,
     PostureFeedbackReader,
     PostureFeedbackWriter,
-    ReferenceWriter,
-    inhibition_state,
     read_body_mode,
-    read_reference,
-    read_state_word,
-    read_twist,
 )
+from dmp_cpg_ros.nodes.messages.reference import ReferenceWriter, read_reference
 from dmp_cpg_ros.nodes.messages.robot_state import (
     FootContactsReader,
     JointsReader,

@@ -55,7 +55,7 @@ from dmp_cpg_ros.nodes.framework.parameters import (
     help_text,
 )
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter, read_twist
+from dmp_cpg_ros.nodes.messages.commands import read_twist
 from dmp_cpg_ros.nodes.messages.interfaces import (
     INTERFACES,
     TOPICS,
@@ -65,6 +65,7 @@ from dmp_cpg_ros.nodes.messages.interfaces import (
     read_by,
     served_by,
 )
+from dmp_cpg_ros.nodes.messages.reference import ReferenceWriter
 from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp
 from dmp_cpg_ros.suite_table import KINDS
 

@@ -24,8 +24,8 @@ from std_msgs.msg import String
 from dmp_cpg_ros.commands.live_view import Polled
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.nodes.framework.own_messages import OwnMessages
-from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
 from dmp_cpg_ros.nodes.messages.interfaces import READER_DEPTH, interface, private
+from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
 from dmp_cpg_ros.nodes.messages.values import header_ns, read_counts, set_stamp, stamp_ns
 from dmp_cpg_ros.suite_table import POSTURE, ROBOT
 

@@ -24,8 +24,8 @@ from ros_processes import Ros
 
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework.judging import judge
-from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter
 from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.reference import ReferenceWriter
 
 ros, ros_domain = ros_processes.ros, ros_processes.ros_domain
 

@@ -26,8 +26,8 @@ from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.core.suite_parameters import INHIBITION
 from dmp_cpg_ros.nodes import scenario_player
 from dmp_cpg_ros.nodes.framework.execution import make_executor
-from dmp_cpg_ros.nodes.messages.conversions import DRIVE_MODES
 from dmp_cpg_ros.nodes.messages.interfaces import Interface, interface
+from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES
 from dmp_cpg_ros.nodes.messages.values import set_stamp
 from dmp_cpg_ros.nodes.scenario_player import (
     REPEAT_NS,

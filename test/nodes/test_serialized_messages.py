@@ -17,7 +17,7 @@ from sensor_msgs.msg import Imu, JointState
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
-from dmp_cpg_ros.nodes.messages.conversions import read_reference
+from dmp_cpg_ros.nodes.messages.reference import read_reference
 from dmp_cpg_ros.nodes.messages.robot_state import read_imu
 from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.studies.fuzz_bytes import KINDS, fuzz

@@ -21,9 +21,11 @@ from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase_generator, state_at
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
-from dmp_cpg_ros.nodes.messages import conversions, markers
+from dmp_cpg_ros.nodes.messages import markers
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.markers import FootMarkers
+from dmp_cpg_ros.nodes.messages.posture_feedback import PostureFeedbackWriter
+from dmp_cpg_ros.nodes.messages.reference import ReferenceWriter
 from dmp_cpg_ros.nodes.messages.robot_state import OdometryWriter
 from dmp_cpg_ros.nodes.visualization import STEP_M, Visualization
 from dmp_cpg_ros.robot.model_reader import load_description
@@ -67,7 +69,7 @@ def test_the_node_draws_the_feet_and_follows_the_body(processes: Processes, ros:
     robot = load_description(find_config(OWN_ROBOT))
     legs, gait = RobotLegs(robot), GAITS['amble']
     posture, canonical, reference, odometry = (
-        conversions.PostureFeedbackWriter(), canonical_writer(), conversions.ReferenceWriter(),
+        PostureFeedbackWriter(), canonical_writer(), ReferenceWriter(),
         OdometryWriter())
     publishers = {name: ros.node.create_publisher(
         interface(name).type, name, interface(name).publisher_qos)

@@ -17,8 +17,9 @@ from ros_processes import SHARED_HZ, NodeProcess, Processes, Ros, reserved_domai
 from test_readme import TRANSCRIPTS, as_shown, files, transcript
 
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
-from dmp_cpg_ros.nodes.messages.conversions import read_body_mode, read_state_word
+from dmp_cpg_ros.nodes.messages.inhibition import read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
 from dmp_cpg_ros.nodes.messages.values import stamp_ns
 
 BIN = Path(sys.prefix) / 'bin'

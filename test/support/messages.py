@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dmp_cpg_ros.nodes.messages.conversions import CanonicalStateWriter
+from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateWriter
 from dmp_cpg_ros.suite import load_gaits
 
 

@@ -44,7 +44,7 @@ from dmp_cpg_ros.nodes.framework.gaits import description_of, known_gaits
 from dmp_cpg_ros.nodes.framework.judging import Step
 from dmp_cpg_ros.nodes.framework.parameters import plain
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
-from dmp_cpg_ros.nodes.messages.conversions import read_twist
+from dmp_cpg_ros.nodes.messages.commands import read_twist
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from dmp_cpg_ros.nodes.framework import known_stop
 from dmp_cpg_ros.nodes.framework.health import RobotTiming
 from dmp_cpg_ros.nodes.framework.known_stop import KnownStop
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages import conversions
+from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES, JointTargetsReader
 from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.robot.target_loss import BORNE
 from dmp_cpg_ros.robot.watchdog import CARRIED_NS, CommandWatchdog
@@ -41,7 +41,7 @@ class DrivenRobot(SuiteNode):
         """Begin without targets; for ``configure``."""
         self._description, self._drive_options = description, options
         self._timing, self._reader = (
-            RobotTiming(), conversions.JointTargetsReader(description.joint_names))
+            RobotTiming(), JointTargetsReader(description.joint_names))
         self._drive_mode, self._drive_publisher = '', self.publisher('drive_mode')
         self._silent_ns = {'silent': -1, 'late': -1, 'lost': -1}
         kept = KnownStop(self, 'kept_gains')
@@ -124,7 +124,7 @@ class DrivenRobot(SuiteNode):
 
     def tell_drive(self, fallback: str) -> None:
         """Say whether the joints follow the legs, or what the robot does by itself."""
-        mode = fallback or conversions.DRIVE_MODES[0]
+        mode = fallback or DRIVE_MODES[0]
         if mode != self._drive_mode:
             self._drive_mode = mode
             self._drive_publisher.publish(String(data=mode))

@@ -8,7 +8,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
-from dmp_cpg_ros.nodes.messages.conversions import GaitMemoryReader
+from dmp_cpg_ros.nodes.messages.canonical_state import GaitMemoryReader
 from dmp_cpg_ros.nodes.messages.values import header_ns
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
-from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, InhibitionGainsWriter
+from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader, InhibitionGainsWriter
 from dmp_cpg_ros.nodes.messages.values import header_ns
 
 if TYPE_CHECKING:

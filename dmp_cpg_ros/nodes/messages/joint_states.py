@@ -1,13 +1,11 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``JointState`` messages as arrays, by name.
-
-Values pass bit for bit.
-"""
+"""``JointState`` messages as arrays, by name."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +14,8 @@ from sensor_msgs.msg import JointState
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.nodes.messages.cdr import FIELDS, RefilledMessage, SerializedJointState
 from dmp_cpg_ros.nodes.messages.values import Array, checked, sensed
+
+AnyJointState: TypeAlias = JointState | SerializedJointState
 
 
 class JointStateReader:
@@ -39,7 +39,7 @@ class JointStateReader:
         self._seen: list[str] = list(names)
         self._index: NDArray[np.intp] | None = None
 
-    def read(self, message: JointState | SerializedJointState) -> list[Array]:
+    def read(self, message: AnyJointState) -> list[Array]:
         """Arrays (n,) of the needed fields in our order; raises DataError."""
         names = message.name
         size = len(names)

@@ -11,14 +11,18 @@ from typing import NamedTuple
 import numpy as np
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Imu, JointState
+from sensor_msgs.msg import Imu
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimate
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, RobotState
 from dmp_cpg_ros.layouts import work_rows
 from dmp_cpg_ros.nodes.messages import cdr
-from dmp_cpg_ros.nodes.messages.joint_states import JointStateReader, JointStateWriter
+from dmp_cpg_ros.nodes.messages.joint_states import (
+    AnyJointState,
+    JointStateReader,
+    JointStateWriter,
+)
 from dmp_cpg_ros.nodes.messages.values import Array, checked, sensed, set_stamp
 
 BASE_FRAME, ODOM_FRAME, WORLD_FRAME = 'base_link', 'odom', 'world'
@@ -141,7 +145,7 @@ class JointsReader:
         self._without_effort = JointStateReader(
             joint_names, ('position', 'velocity'), strict=strict)
 
-    def read(self, message: JointState | cdr.SerializedJointState) -> list[Array]:
+    def read(self, message: AnyJointState) -> list[Array]:
         """Position [rad], velocity [rad/s] and effort [N m] (0 where absent), each (12,)."""
         if len(message.effort):
             return self._full.read(message)
@@ -155,7 +159,7 @@ class FootContactsReader:
         """Prepare the order of the feet."""
         self._reader = JointStateReader(FOOT_NAMES, ('effort',), strict=False)
 
-    def read(self, message: JointState | cdr.SerializedJointState) -> Array:
+    def read(self, message: AnyJointState) -> Array:
         """Normal forces, ndarray (4,) [N]."""
         return self._reader.read(message)[0]
 

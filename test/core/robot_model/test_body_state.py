@@ -23,8 +23,8 @@ from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.nodes.messages.cdr import Serialized
-from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter
 from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.reference import ReferenceWriter
 from dmp_cpg_ros.nodes.messages.robot_state import (
     FootContactsReader,
     OdometryWriter,
