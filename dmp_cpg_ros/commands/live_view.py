@@ -10,26 +10,23 @@ from __future__ import annotations
 
 import argparse
 import json
-import queue
 import secrets
 import sys
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future
-from concurrent.futures import TimeoutError as Late
 from typing import Any
 
 import numpy as np
 import rclpy
-from rcl_interfaces.srv import GetParameters, SetParameters
+from rcl_interfaces.srv import GetParameters
 from rclpy.callback_groups import CallbackGroup
-from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
-from std_srvs.srv import SetBool, Trigger
 
-from dmp_cpg_ros.commands.suite_client import SuiteClient, connected, deliver, prepared
+from dmp_cpg_ros.commands.suite_client import SuiteClient, connected, prepared
+from dmp_cpg_ros.commands.view_commands import ViewCommands
 from dmp_cpg_ros.commands.view_server import Frames, ViewServer
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core import suite_parameters as core
@@ -38,8 +35,7 @@ from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
-from dmp_cpg_ros.core.modes.requests import REQUESTS
-from dmp_cpg_ros.core.parameters import Parameters, shown
+from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.nodes.framework.execution import schedule
@@ -51,13 +47,12 @@ from dmp_cpg_ros.nodes.framework.parameters import (
     plain,
 )
 from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader
-from dmp_cpg_ros.nodes.messages.commands import push_force, twist
 from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader, read_state_word
-from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, interface
+from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
 from dmp_cpg_ros.nodes.messages.reference import read_reference
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, JointsReader, read_odom
-from dmp_cpg_ros.nodes.messages.values import checked_numbers, header_ns
+from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.robot.scene import Scene
 from dmp_cpg_ros.suite import load_gaits
@@ -68,15 +63,6 @@ OK, FAILED = 0, 1
 
 PERIOD_S = 1.0 / 30.0
 """Time between two frames [s]."""
-
-DEAD_MAN_S = 0.5
-"""Silence of a browser that drives after which the command is zero [s]."""
-
-ANSWER_WITHIN_S = 60.0
-"""How long the suite may take to answer [s]: to refuse a gait, it seeks one that works."""
-
-LARGEST_PUSH = 1000.0
-"""Largest component of a push [N]."""
 
 TIMED_S = 1.0
 """Span over which the real-time factor is taken [s]."""
@@ -119,6 +105,11 @@ class LiveView:
     client : SuiteClient
         The suite.
 
+    Attributes
+    ----------
+    commands : ViewCommands
+        What takes commands.
+
     Raises
     ------
     ClientError
@@ -143,23 +134,22 @@ class LiveView:
         self._joint_names = load_robot_file(file).joint_names
         self._scene = Scene(file, core.chosen_world(
             robot[WorldParameters], robot[core.RobotParameters]))
-        reference, self._gaits = limits[ReferenceParameters], tuple(gaits.gaits)
+        reference = limits[ReferenceParameters]
         self.drives = not robot[LockStepParameters].lock_step
         self.scene = json.dumps({
-            **self._scene.shapes(), 'robot': file.stem, 'gaits': self._gaits,
+            **self._scene.shapes(), 'robot': file.stem, 'gaits': list(gaits.gaits),
             'drives': self.drives, 'rate': robot[core.TickParameters].control_rate,
             'inhibited': inhibition[InhibitionParameters].inhibited_legs,
             'limits': [reference.max_speed, reference.max_lateral_speed, reference.max_turn_rate],
         }).encode()
-        self._tasks: queue.Queue[tuple[str, Any, Future[Any]]] = queue.Queue()
-        self._heard, self._driving = 0.0, False
         self._walls: deque[tuple[float, int]] = deque()
         self._stop: dict[str, str] = {}
         self._mode = ''
         self._values: dict[str, Any] = {}
         self._subscribe(gaits)
-        self._make_ends(STAMPED_CMD_VEL if limits[core.CommandParameters].stamped_cmd_vel
-                        else interface('cmd_vel'))
+        self.commands = ViewCommands(
+            client, gaits.gaits if self.drives else None,
+            stamped=limits[core.CommandParameters].stamped_cmd_vel)
 
     def _subscribe(self, gaits: KnownGaits) -> None:
         newest = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=1,
@@ -188,129 +178,20 @@ class LiveView:
                            ('inhibition_gains', hear_gains)):
             heard.listen(interface(name), hear)
 
-    def _make_ends(self, velocity: Any) -> None:
-        """Create the ends of commands; those of services first: see SuiteClient."""
-        node = self._node
-        self._services = {name: node.create_client(interface(name).type, name)
-                          for name in ('inhibit', *REQUESTS)}
-        self._setter = node.create_client(SetParameters, f'{core.CANONICAL}/set_parameters')
-        self._client.meet((core.INHIBITION, core.CANONICAL), *self._services.values(),
-                          self._setter)
-        self._velocity_type = velocity.type
-        self._velocity, self._pushes = map(self._client.publisher, (velocity, interface('push')))
-
-    # Commands ------------------------------------------------------------------------------------
-
-    def take(self, command: Any) -> dict[str, Any]:
-        """Take a command from another thread, and wait for the answer.
-
-        Parameters
-        ----------
-        command : value of JSON, numbers as floats
-            An object of one entry: ``velocity`` (v_x, v_y [m/s], γ [rad/s]), ``push`` (force in
-            the world [N]), ``inhibit`` (whether to stop), ``request`` (one of ``REQUESTS``) or
-            ``gait``.
-
-        Returns
-        -------
-        dict
-            Whether it was taken (``taken``), and what the suite says (``text``).
-
-        Raises
-        ------
-        DataError
-            If it is none of these; nothing has been sent then.
-        """
-        name, value = self._checked(command)
-        answer: Future[tuple[bool, str]] = Future()
-        self._tasks.put((name, value, answer))
-        try:
-            taken, text = answer.result(ANSWER_WITHIN_S)
-        except Late:
-            taken, text = False, 'the suite did not answer'
-        return {'taken': taken, 'text': text}
-
-    def _checked(self, command: Any) -> tuple[str, Any]:
-        if not self.drives:
-            raise DataError('in lock-step nobody commands from outside: this view looks on')
-        if not isinstance(command, dict) or len(command) != 1:
-            raise DataError(f'a command is an object of one entry, not {shown(command)}')
-        ((name, value),) = command.items()
-        words = {'request': REQUESTS, 'gait': self._gaits, 'inhibit': (True, False)}
-        if name in words:
-            if not any(value is word or (isinstance(value, str) and value == word)
-                       for word in words[name]):
-                raise DataError(f'{name} must be one of {words[name]}, not {shown(value)}')
-            return name, value
-        if name not in ('velocity', 'push'):
-            raise DataError(f'{shown(name)} is no command; valid are velocity, push, '
-                            f'{", ".join(words)}')
-        if not isinstance(value, list) or len(value) != 3 or not all(
-                isinstance(entry, float) for entry in value):
-            raise DataError(f'{name} must be three numbers, not {shown(value)}')
-        numbers = checked_numbers(tuple(value), name)
-        if name == 'push' and max(map(abs, numbers)) > LARGEST_PUSH:
-            raise DataError(f'a push has at most {LARGEST_PUSH:g} N on each axis')
-        return name, numbers
-
-    def _execute(self, name: str, value: Any, answer: Future[Any]) -> None:
-        if name == 'velocity':
-            self._heard, self._driving = time.monotonic(), any(value)
-            self._drive(value)
-            answer.set_result((True, ''))
-        elif name == 'push':
-            self._pushes.publish(push_force(value, 'world'))
-            answer.set_result((True, ''))
-        elif name == 'gait':
-            change = Parameter('gait', value=value).to_parameter_msg()
-            self._ask(self._setter, SetParameters.Request(parameters=[change]), answer,
-                      lambda response: (response.results[0].successful,
-                                        response.results[0].reason or f'changes to {value}'))
-        else:
-            service, request = ('inhibit', SetBool.Request(data=value)) if name == 'inhibit' else (
-                value, Trigger.Request())
-            self._ask(self._services[service], request, answer,
-                      lambda response: (response.success, response.message))
-
-    def _ask(self, client: Any, request: Any, answer: Future[Any],
-             read: Callable[[Any], tuple[bool, str]]) -> None:
-        def answered(future: Any) -> None:
-            if not answer.cancelled():
-                answer.set_result(read(future.result()))
-
-        client.call_async(request).add_done_callback(answered)
-
-    def _drive(self, velocity: Sequence[float]) -> None:
-        message = twist(self._velocity_type, velocity)
-        if hasattr(message, 'header'):
-            message.header.stamp = self._node.get_clock().now().to_msg()
-        self._velocity.publish(message)
-
-    # Frames --------------------------------------------------------------------------------------
-
     def run(self, frames: Frames) -> None:
         """Show frames and take commands until Ctrl-C."""
         due = time.monotonic()
         try:
             while True:
-                self._client.spin_until(lambda: not self._tasks.empty(), due - time.monotonic())
-                while not self._tasks.empty():
-                    self._execute(*self._tasks.get())
+                self._client.spin_until(self.commands.waiting, due - time.monotonic())
+                self.commands.execute()
                 now = time.monotonic()
-                if self._driving and now - self._heard > DEAD_MAN_S:
-                    self._let_go()
                 if now >= due:
                     due = max(due + PERIOD_S, now)
                     if frames.viewers and (frame := self._frame(now)):
                         frames.put(json.dumps(frame).encode())
         finally:
-            if self._driving:
-                self._let_go()
-                deliver(self._velocity)
-
-    def _let_go(self) -> None:
-        self._driving = False
-        self._drive((0.0, 0.0, 0.0))
+            self.commands.end()
 
     def _frame(self, now: float) -> dict[str, Any]:
         """What is shown of this moment; empty as long as there is nothing."""
@@ -379,7 +260,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     def take(command: Any) -> dict[str, Any]:
         if not views:
             raise DataError('the suite is not there yet')
-        return views[0].take(command)
+        return views[0].commands.take(command)
 
     try:
         server = ViewServer(secrets.token_urlsafe(24), frames, lambda: scene[0], take,

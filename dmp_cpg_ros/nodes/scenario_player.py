@@ -7,15 +7,15 @@ the robot down at the end.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist
-from rcl_interfaces.srv import GetParameters, SetParametersAtomically
+from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.node import Node
-from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter import Parameter
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -27,22 +27,22 @@ from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.scenario.fault import Fault
 from dmp_cpg_ros.core.scenario.push import Push
 from dmp_cpg_ros.core.scenario.scenario import Action, Command, Scenario
-from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
+from dmp_cpg_ros.core.suite_parameters import CHANGEABLE
+from dmp_cpg_ros.nodes.framework.acknowledged_topic import AcknowledgedTopic
 from dmp_cpg_ros.nodes.framework.own_messages import OwnMessages
-from dmp_cpg_ros.nodes.framework.parameters import plain
+from dmp_cpg_ros.nodes.framework.requests import ParameterSetter, ask
 from dmp_cpg_ros.nodes.messages.commands import push_force, twist
 from dmp_cpg_ros.nodes.messages.inhibition import read_state_word
-from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, interface, private
+from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, interface
 from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES, read_drive_mode
 from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
-from dmp_cpg_ros.nodes.messages.values import header_ns, read_counts, set_stamp, stamp_ns
+from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamp_ns
 
 FAR_NS = 2**31 * 10**9 - 1
 """A stamp later than every run [ns]."""
 
 LEAD_NS = 40_000_000
 """In real time a push is stamped so much later than the clock that its message is in time [ns]."""
-
 
 REPEAT_NS, REPEATED_NS = 200_000_000, 3_000_000_000
 """In real time a service that refuses is asked again after a time, and for how long [ns]: on a
@@ -55,146 +55,6 @@ PATIENCE_NS = 12_000_000_000
 
 class PlayerError(DmpCpgError):
     """The suite did not take a command or a request."""
-
-
-class AcknowledgedTopic:
-    """Publishes an interface of the table and counts what its readers have taken.
-
-    Parameters
-    ----------
-    node : Node
-        Who sends.
-    heard : OwnMessages
-        What it reads.
-    name : str
-        Topic whose readers tell of it on ``~/commands_taken``.
-    """
-
-    def __init__(self, node: Node, heard: OwnMessages, name: str) -> None:
-        """Create the publisher, and a subscription for each reader."""
-        topic, self._name = interface(name), name
-        self._publisher = node.create_publisher(topic.type, topic.name, topic.publisher_qos)
-        self._sent, self._taken = 0, dict.fromkeys(topic.subscribers, 0.0)
-        self._missed, self._last = dict.fromkeys(topic.subscribers, 0), list[Any]()
-        self._then: Callable[[], None] | None = None
-        self._answers = [
-            heard.listen(private('~/commands_taken', reader), self._hearing(reader))
-            for reader in topic.subscribers]
-
-    def connected(self) -> bool:
-        """Whether all readers are there."""
-        return bool(self._publisher.get_subscription_count() >= len(self._answers) and all(
-            answer.get_publisher_count() for answer in self._answers))
-
-    def send(self, messages: Sequence[Any], then: Callable[[], None]) -> None:
-        """Publish, and call back once, when every reader has taken everything that was sent."""
-        for message in messages:
-            self._publisher.publish(message)
-        self._sent, self._then, self._last = self._sent + len(messages), then, [*messages]
-        self._look()
-
-    def renew(self, readers: Collection[str]) -> None:
-        """Send the last messages again when one of the readers was restarted."""
-        restarted = [reader for reader in readers if reader in self._taken]
-        for reader in restarted:
-            self._missed[reader], self._taken[reader] = self._sent, 0.0
-        if restarted and self._sent:
-            self.send(self._last, self._then or (lambda: None))
-
-    def _hearing(self, reader: str) -> Callable[[JointState], None]:
-        def hear(message: JointState) -> None:
-            self._taken[reader] = read_counts(message).get(self._name, 0.0)
-            self._look()
-
-        return hear
-
-    def _look(self) -> None:
-        if self._then is not None and all(
-                taken + self._missed[reader] >= self._sent
-                for reader, taken in self._taken.items()):
-            then, self._then = self._then, None
-            then()
-
-
-def ask(client: Any, request: Any, done: Callable[[bool, str], None]) -> None:
-    """Call a service, of a node's parameters or another one; ``done`` is told whether it agrees,
-    and in which words.
-    """
-
-    def answered(future: Future) -> None:
-        answer = future.result()
-        result = getattr(answer, 'result', answer)
-        if result is None:
-            done(False, 'no answer')
-        elif result is answer:
-            done(result.success, result.message)
-        else:
-            done(result.successful, result.reason)
-
-    client.call_async(request).add_done_callback(answered)
-
-
-class ParameterSetter:
-    """Calls the nodes' own parameter services, as ``ros2 param set`` does.
-
-    Parameters
-    ----------
-    node : Node
-        Who asks.
-    """
-
-    def __init__(self, node: Node) -> None:
-        """Create the clients."""
-        self._setters = {owner: node.create_client(
-            SetParametersAtomically, f'{owner}/set_parameters_atomically') for owner in CHANGEABLE}
-        self._getters = {owner: node.create_client(GetParameters, f'{owner}/get_parameters')
-                         for owner in CHANGEABLE}
-
-    def connected(self) -> bool:
-        """Whether all services are there."""
-        return all(client.service_is_ready()
-                   for client in (*self._setters.values(), *self._getters.values()))
-
-    def set(self, values: Mapping[str, Any], done: Callable[[str], None]) -> None:
-        """Ask for a change.
-
-        Parameters
-        ----------
-        values : mapping of str to value
-            Parameters of one owner.
-        done : callable (reason)
-            Called with why the change is refused, or with an empty text once the owner has
-            accepted it and all followers know it.
-        """
-        owner = OWNER[next(iter(values))]
-        wanted = {name: plain(value) for name, value in values.items()}
-        request = SetParametersAtomically.Request(parameters=[
-            Parameter(name, value=value).to_parameter_msg() for name, value in wanted.items()])
-
-        def answered(agreed: bool, reason: str) -> None:
-            if agreed:
-                self._await([node for node in CHANGEABLE if node != owner], wanted, done)
-            else:
-                done(reason)
-
-        ask(self._setters[owner], request, answered)
-
-    def _await(self, followers: list[str], wanted: Mapping[str, Any],
-               done: Callable[[str], None]) -> None:
-        """Ask each follower until it has the values."""
-        if not followers:
-            done('')
-            return
-
-        def answered(future: Future) -> None:
-            answer = future.result()
-            known = [] if answer is None else [
-                plain(parameter_value_to_python(value)) for value in answer.values]
-            follow = followers[1:] if known == list(wanted.values()) else followers
-            self._await(follow, wanted, done)
-
-        request = GetParameters.Request(names=list(wanted))
-        self._getters[followers[0]].call_async(request).add_done_callback(answered)
 
 
 class ScenarioPlayer(Node):  # type: ignore[misc]
