@@ -40,12 +40,7 @@ from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.nodes.framework.execution import schedule
 from dmp_cpg_ros.nodes.framework.own_messages import OwnMessages
-from dmp_cpg_ros.nodes.framework.parameters import (
-    BATCH,
-    LockStepParameters,
-    ParameterTable,
-    plain,
-)
+from dmp_cpg_ros.nodes.framework.parameters import BATCH, LockStepParameters, ParameterTable, plain
 from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader
 from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import interface

@@ -81,7 +81,7 @@ def _main(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> int:
     from dmp_cpg_ros.commands.fork_server import ForkServer
 
     with ForkServer() as server:  # imports what nodes need while this process does
-        from dmp_cpg_ros.commands.suite_run import alone_in_domain
+        from dmp_cpg_ros.commands.suite_domain import alone_in_domain
 
         with alone_in_domain(ros.namespace, lambda: _planned(options, ros)) as plan:
             return _walk(plan, server)
@@ -189,7 +189,8 @@ def _found(name: str | Path, folder: str) -> Path:
 
 def _run(plan: _Plan, folder: Path, server: ForkServer) -> int:
     """Bring the suite up, play, bring it down; returns the exit status."""
-    from dmp_cpg_ros.commands.suite_run import InterruptedRunError, run_suite
+    from dmp_cpg_ros.commands.ending_signals import InterruptedRunError
+    from dmp_cpg_ros.commands.suite_run import run_suite
 
     options, ros = plan.options, plan.ros
     resolved = plan.resolved(gated=True)

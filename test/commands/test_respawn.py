@@ -143,8 +143,8 @@ def test_a_node_that_hangs_is_named_and_the_run_has_failed(
         processes: Processes, tmp_path: Path) -> None:
     program = (
         'import sys\n'
-        'from dmp_cpg_ros.commands import suite_run\n'
-        f'suite_run.LAST_WORDS_S = suite_run.ENDED_WITHIN_S = {HUNG_S}\n'
+        'from dmp_cpg_ros.commands import suite_run, suite_watch\n'
+        f'suite_watch.LAST_WORDS_S = suite_run.ENDED_WITHIN_S = {HUNG_S}\n'
         'from dmp_cpg_ros.__main__ import walk\n'
         'sys.exit(walk())\n')
     process = processes.python('-c', program, str(scenario(tmp_path, 2.0)), '--no-report', '--out',

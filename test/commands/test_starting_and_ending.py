@@ -24,7 +24,7 @@ from ros_processes import RUN_S, SHARED_HZ, NodeProcess, Processes, Ros, wait_un
 
 from dmp_cpg_ros.analysis.bag import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
-from dmp_cpg_ros.commands.suite_run import alone_in_domain
+from dmp_cpg_ros.commands.suite_domain import alone_in_domain
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError, claim
 
