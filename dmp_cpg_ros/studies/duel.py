@@ -31,14 +31,7 @@ from dmp_cpg_ros.studies.benchmark_cases import DIRECTIONS
 from dmp_cpg_ros.studies.benchmark_walking import steady_cells
 from dmp_cpg_ros.studies.learned_policy import PolicyFile, PolicyRun, load_policy
 from dmp_cpg_ros.studies.push_trials import largest_pushes
-from dmp_cpg_ros.studies.trial_tables import (
-    Results,
-    Table,
-    by_cell,
-    least_and_median,
-    run,
-    tell,
-)
+from dmp_cpg_ros.studies.trial_tables import Results, Table, by_cell, least_and_median, run, tell
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_gait
 

@@ -35,12 +35,7 @@ from dmp_cpg_ros.core.scenario.fault import (
 from dmp_cpg_ros.nodes.framework.ticks import TickInputs
 from dmp_cpg_ros.robot.mujoco_robot import LYING_TILT, MujocoRobot
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
-from dmp_cpg_ros.studies.output import (
-    at_least_one,
-    markdown_table,
-    parser_of,
-    write_results,
-)
+from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_gaits, load_suite
 

@@ -11,12 +11,7 @@ import pytest
 from core_examples import GAITS, TICK, TICK_NS, quadruped, standing_state
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import (
-    gait_rows,
-    gaits_walked,
-    planned_stance,
-    steady_segments,
-)
+from dmp_cpg_ros.analysis.episodes import gait_rows, gaits_walked, planned_stance, steady_segments
 from dmp_cpg_ros.analysis.metrics.summary import gait_metrics, phase_errors
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters

@@ -13,14 +13,7 @@ from PIL import Image
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
-from dmp_cpg_ros.commands.film import (
-    Shot,
-    checked_film_path,
-    film,
-    has_encoder,
-    main,
-    write_film,
-)
+from dmp_cpg_ros.commands.film import Shot, checked_film_path, film, has_encoder, main, write_film
 from dmp_cpg_ros.commands.walk import main as walk
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.robot.camera import Camera

@@ -20,12 +20,7 @@ from ros_processes import Processes, Ros, composed_suite
 from dmp_cpg_ros.commands import reference
 from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS
 from dmp_cpg_ros.nodes.framework.parameters import FOREIGN_PREFIXES
-from dmp_cpg_ros.nodes.messages.interfaces import (
-    COMMAND_INTERFACES,
-    SERVICES,
-    TOPICS,
-    Interface,
-)
+from dmp_cpg_ros.nodes.messages.interfaces import COMMAND_INTERFACES, SERVICES, TOPICS, Interface
 from dmp_cpg_ros.suite_table import DRIVER, KINDS, RECORDER, VISUALIZATION
 
 shared_domain, shared_ros = ros_processes.shared_domain, ros_processes.shared_ros

@@ -29,12 +29,7 @@ from dmp_cpg_ros.nodes.framework.execution import make_executor
 from dmp_cpg_ros.nodes.messages.interfaces import Interface, interface
 from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES
 from dmp_cpg_ros.nodes.messages.values import set_stamp
-from dmp_cpg_ros.nodes.scenario_player import (
-    REPEAT_NS,
-    REPEATED_NS,
-    PlayerError,
-    ScenarioPlayer,
-)
+from dmp_cpg_ros.nodes.scenario_player import REPEAT_NS, REPEATED_NS, PlayerError, ScenarioPlayer
 from dmp_cpg_ros.suite_table import ROBOT
 
 ros_domain = ros_processes.ros_domain

@@ -10,12 +10,7 @@ import pytest
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.paper.jacobians import numerical_jacobian
-from dmp_cpg_ros.paper.transverse_metric import (
-    Orbit,
-    find_orbit,
-    floquet_rate,
-    transverse_metric,
-)
+from dmp_cpg_ros.paper.transverse_metric import Orbit, find_orbit, floquet_rate, transverse_metric
 
 HOPF = AndronovHopf(2.0)
 

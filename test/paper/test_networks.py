@@ -15,11 +15,7 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import phase, state_at, wrapped
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.paper.network import (
-    EdgeCoupling,
-    MeanFieldCoupling,
-    OscillatorNetwork,
-)
+from dmp_cpg_ros.paper.network import EdgeCoupling, MeanFieldCoupling, OscillatorNetwork
 from dmp_cpg_ros.paper.oscillators import (
     HopfOscillators,
     MixedOscillators,

@@ -15,12 +15,7 @@ import numpy as np
 import pytest
 from core_examples import TICK, quadruped, standing_state
 
-from dmp_cpg_ros.analysis.recording import (
-    FootForceSeries,
-    JointSeries,
-    OdometrySeries,
-    Recording,
-)
+from dmp_cpg_ros.analysis.recording import FootForceSeries, JointSeries, OdometrySeries, Recording
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary, body_at_rest

@@ -19,12 +19,7 @@ from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.contraction import inhibited
 from dmp_cpg_ros.core.contraction.capture import CaptureSet, capture_set
 from dmp_cpg_ros.core.contraction.capture_anywhere import needed_gain_anywhere
-from dmp_cpg_ros.core.contraction.delays import (
-    Capture,
-    carried_margin,
-    held_margin,
-    late_margin,
-)
+from dmp_cpg_ros.core.contraction.delays import Capture, carried_margin, held_margin, late_margin
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium, inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, PROVED
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound, mismatch_margin

@@ -33,11 +33,7 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from rclpy.utilities import (
-    get_default_context,
-    get_rmw_implementation_identifier,
-    remove_ros_args,
-)
+from rclpy.utilities import get_default_context, get_rmw_implementation_identifier, remove_ros_args
 
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError

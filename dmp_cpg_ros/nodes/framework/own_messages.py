@@ -21,12 +21,7 @@ from rclpy.subscription import Subscription
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.nodes.framework.writer_watch import WriterWatch
-from dmp_cpg_ros.nodes.framework.writers import (
-    LOOK_EVERY_S,
-    Publishers,
-    is_ticked,
-    only_taken,
-)
+from dmp_cpg_ros.nodes.framework.writers import LOOK_EVERY_S, Publishers, is_ticked, only_taken
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader, serialized_stamp
 from dmp_cpg_ros.nodes.messages.interfaces import READER_DEPTH, Interface
 from dmp_cpg_ros.suite_table import KINDS

@@ -37,15 +37,7 @@ from dmp_cpg_ros.core.estimation.parameters import ESTIMATE, GROUND_TRUTH
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import CANONICAL, INHIBITION, REFERENCE
 from dmp_cpg_ros.nodes.messages.transforms import TFMessage
-from dmp_cpg_ros.suite_table import (
-    DRIVER,
-    KINDS,
-    LEG,
-    POSTURE,
-    RECORDER,
-    ROBOT,
-    VISUALIZATION,
-)
+from dmp_cpg_ros.suite_table import DRIVER, KINDS, LEG, POSTURE, RECORDER, ROBOT, VISUALIZATION
 
 PUBLISHER_DEPTH = 2000
 """Messages that a publisher of every tick keeps for readers that lag: 4 s at 500 Hz, more than the

@@ -22,11 +22,7 @@ from dmp_cpg_ros.core.contraction.synchronisation import (
     synchronisation_complement,
 )
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.paper.matrix_measure import (
-    coupling_measure,
-    disagreement_measure,
-    matrix_measure,
-)
+from dmp_cpg_ros.paper.matrix_measure import coupling_measure, disagreement_measure, matrix_measure
 from dmp_cpg_ros.studies.draws import random_edges
 
 SEEDS = st.integers(0, 10_000)

@@ -8,13 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from demonstrations import (
-    LETTERS,
-    handwriting,
-    joint_angles,
-    straight_reach,
-    walking_joints,
-)
+from demonstrations import LETTERS, handwriting, joint_angles, straight_reach, walking_joints
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -15,11 +15,7 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import phase, state_at, wrapped
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.primitives.primitive import VonMisesBases
-from dmp_cpg_ros.core.primitives.rhythmic import (
-    RhythmicInput,
-    RhythmicPrimitive,
-    hopf_flow,
-)
+from dmp_cpg_ros.core.primitives.rhythmic import RhythmicInput, RhythmicPrimitive, hopf_flow
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 from dmp_cpg_ros.core.primitives.time_scaling import StepGrid
 

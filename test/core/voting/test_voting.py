@@ -27,13 +27,7 @@ from dmp_cpg_ros.core.voting.voters import (
     vote_sensors,
     watch_feet,
 )
-from dmp_cpg_ros.core.voting.votes import (
-    FADE_STEPS,
-    MOST_VOTERS,
-    NO_VOTES,
-    VoteInbox,
-    VoteMemory,
-)
+from dmp_cpg_ros.core.voting.votes import FADE_STEPS, MOST_VOTERS, NO_VOTES, VoteInbox, VoteMemory
 from dmp_cpg_ros.core.voting.voting import (
     VoteClamp,
     Voting,
