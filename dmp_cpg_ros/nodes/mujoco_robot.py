@@ -26,10 +26,9 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.core.scenario.fault import Fault, FaultInjector
 from dmp_cpg_ros.core.voting.parameters import VotingSwitch
-from dmp_cpg_ros.nodes.framework.certified import Sets
 from dmp_cpg_ros.nodes.framework.driven_robot import DrivenRobot
 from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers
-from dmp_cpg_ros.nodes.framework.parameters import NodeParameters
+from dmp_cpg_ros.nodes.framework.parameters import NodeParameters, Sets
 from dmp_cpg_ros.nodes.messages.commands import read_push_force
 from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS, Interface
 from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode

@@ -49,7 +49,7 @@ from std_srvs.srv import SetBool, Trigger
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.push import LARGEST_FORCE
-from dmp_cpg_ros.nodes.framework import certified
+from dmp_cpg_ros.nodes.framework import parameter_follower
 from dmp_cpg_ros.nodes.framework.gaits import follow_gait, known_gaits
 from dmp_cpg_ros.nodes.framework.writer_watch import SILENT_NS
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
@@ -422,7 +422,7 @@ def test_a_false_answer_about_parameters_is_refused(
         response.values = [ParameterValue(type=77) for _ in request.names]
         return response
 
-    monkeypatch.setattr(certified, 'ASK_EVERY_S', 0.05)
+    monkeypatch.setattr(parameter_follower, 'ASK_EVERY_S', 0.05)
     ros.node.create_service(GetParameters, 'canonical_oscillators/get_parameters', answer)
     node = ReferenceFilter('follower', context=ros.context)
     node.start()

@@ -9,23 +9,17 @@ refuses a change that would lose it; the others follow what the owner has accept
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from math import nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rcl_interfaces.msg import ParameterEvent, ParameterValue
-from rcl_interfaces.srv import GetParameters
-from rclpy.parameter import parameter_value_to_python
-from rclpy.qos import qos_profile_parameter_events
-from rclpy.task import Future
-
 from dmp_cpg_ros.core import suite_parameters as suite
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.certificates import gate
 from dmp_cpg_ros.core.certificates.inequality import Certificate
-from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
@@ -41,17 +35,14 @@ from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters, 
 from dmp_cpg_ros.core.reference.governor import Governor
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.nodes.framework.gaits import description_of, known_gaits
-from dmp_cpg_ros.nodes.framework.judging import Step
-from dmp_cpg_ros.nodes.framework.parameters import plain
-from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
+from dmp_cpg_ros.nodes.framework.judging import Step, beside_ticks
+from dmp_cpg_ros.nodes.framework.parameter_follower import ParameterFollower
+from dmp_cpg_ros.nodes.framework.parameters import Sets
 from dmp_cpg_ros.nodes.messages.commands import read_twist
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL
 
 if TYPE_CHECKING:
     from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-
-Sets = Mapping[type[Any], Any]
-"""Parameter sets by their class."""
 
 JUDGED = (*suite.OWNER, 'allow_uncertified')
 """Parameters that may change in a node with a certificate."""
@@ -61,96 +52,6 @@ PROBLEM = 'certificate'
 
 AHEAD_S = 0.25
 """Time within which a verdict is expected, for which the moving cadence is looked ahead [s]."""
-
-ASK_EVERY_S = 5.0
-"""Period of asking the owners [s]: what an event did not tell, because a node was not there yet or
-had to be started again, is known after this time.
-"""
-
-
-class ParameterFollower:
-    """Lets a node follow what the owners of parameters have accepted.
-
-    What ``/parameter_events`` tells anybody can have said, so news make the node ask the owner,
-    and so does time that has passed. False news, and answers that the node refuses, are counted
-    as dropped.
-    """
-
-    def __init__(self, node: SuiteNode) -> None:
-        """Listen, and ask the owners that are there."""
-        self._node, space = node, node.get_namespace().rstrip('/')
-        self._names = {owner: names for owner, names in suite.CHANGEABLE.items()
-                       if owner != node.KIND}
-        self._owners = {f'{space}/{owner}': owner for owner in self._names}
-        self._events = node.create_subscription(
-            ParameterEvent, '/parameter_events', self._on_event, qos_profile_parameter_events,
-            raw=True)
-        self._read = serialized_reader(ParameterEvent)
-        self._askers = {owner: node.create_client(GetParameters, f'{owner}/get_parameters')
-                        for owner in self._names}
-        self._pending: dict[str, Future] = {}
-        self._claimed: dict[str, dict[str, Any]] = {}
-        self._timer = node.create_steady_timer(ASK_EVERY_S, self._ask)
-
-    def end(self) -> None:
-        """Stop following."""
-        self._node.destroy_timer(self._timer)
-        self._node.destroy_subscription(self._events)
-        for client in self._askers.values():
-            self._node.destroy_client(client)
-
-    def _on_event(self, data: bytes) -> None:
-        event: ParameterEvent = self._read(data)
-        owner = self._owners.get(event.node)
-        if owner is None:
-            return
-        told = self._plain(owner, {entry.name: entry.value for entry in (
-            *event.new_parameters, *event.changed_parameters)})
-        if not told:
-            return
-        if not self._askers[owner].service_is_ready():
-            raise DataError(f'{told} is said to be changed by {owner}, which does not answer')
-        asked = self._pending.get(owner)
-        self._claimed[owner] = told
-        if asked is None or asked.done():  # else it asks again when the answer is there
-            self._ask_owner(owner)
-
-    def _plain(self, owner: str, values: Mapping[str, ParameterValue]) -> dict[str, Any]:
-        """Values of the owner's parameters that are followed; raises DataError."""
-        try:
-            return {name: plain(parameter_value_to_python(value))
-                    for name, value in values.items() if name in self._names[owner]}
-        except RuntimeError as error:
-            raise DataError(f'a value of {owner} cannot be read: {error}') from None
-
-    def _ask(self) -> None:
-        for owner, client in self._askers.items():
-            former = self._pending.pop(owner, None)
-            if former is not None and not former.done():
-                client.remove_pending_request(former)
-            if client.service_is_ready():
-                self._ask_owner(owner)
-
-    def _ask_owner(self, owner: str) -> None:
-        claimed = self._claimed.pop(owner, {})
-        future = self._askers[owner].call_async(
-            GetParameters.Request(names=self._names[owner]))
-        self._pending[owner] = future
-        future.add_done_callback(self._node.guarded(
-            f'{owner}/get_parameters', partial(self._answered, owner, claimed)))
-
-    def _answered(self, owner: str, claimed: Mapping[str, Any], future: Future) -> None:
-        answer, names = future.result(), self._names[owner]
-        if answer is None or len(answer.values) != len(names):
-            return
-        told = self._plain(owner, dict(zip(names, answer.values, strict=True)))
-        if owner in self._claimed:
-            self._ask_owner(owner)
-        if not self._node.parameter_changes.follow(told) and any(
-                told[name] != value for name, value in claimed.items()):
-            self._node.drop('/parameter_events', DataError(
-                f'{dict(claimed)} is said to be changed by {owner}, which has not'),
-                self._node.strangers.publishing('/parameter_events'))
 
 
 class Acting(NamedTuple):
@@ -379,7 +280,8 @@ class Certified:
             needed, self._held = self._held is not None, None
             if self._watches or (needed and not self._node.lock_step):
                 running = self._running(self._accepted).settled
-                self._node.beside_ticks(running.certificate, partial(self._learn, running))
+                beside_ticks(
+                    self._node, running.certificate, partial(self._learn, running))
 
     def _learn(self, running: gate.Running, certificate: Certificate) -> None:
         """Take the certificate of what was accepted, unless that is something else by now."""

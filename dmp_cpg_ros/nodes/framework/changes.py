@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -14,8 +15,7 @@ from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.parameters import typed
 from dmp_cpg_ros.core.suite_parameters import OWNER
 from dmp_cpg_ros.nodes.framework import parameters
-from dmp_cpg_ros.nodes.framework.certified import Sets
-from dmp_cpg_ros.nodes.framework.judging import InTurn, Step
+from dmp_cpg_ros.nodes.framework.judging import InTurn, Step, beside_ticks
 
 if TYPE_CHECKING:
     from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
@@ -43,9 +43,9 @@ class ParameterChanges:
     def __init__(self, node: SuiteNode) -> None:
         """Declare the parameters, and take what is asked of them."""
         self._node, self._table = node, node.parameter_table()
-        self.accepted: Sets = parameters.declare(node, self._table)
+        self.accepted: parameters.Sets = parameters.declare(node, self._table)
         self.following = False
-        self._in_turn = InTurn(node.beside_ticks)
+        self._in_turn = InTurn(partial(beside_ticks, node))
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._accept)
 
@@ -105,7 +105,7 @@ class ParameterChanges:
         except Exception:  # noqa: BLE001 - whatever it is, the change itself will say so
             return None
 
-    def between(self, sets: Sets) -> dict[str, Any]:
+    def between(self, sets: parameters.Sets) -> dict[str, Any]:
         """New values of the parameters in which sets differ from those accepted last."""
         before = self._table.values(self.accepted)
         return {name: value for name, value in self._table.values(sets).items()
@@ -131,7 +131,7 @@ class ParameterChanges:
         self.accepted = self._changed(changes)
         self._node.take_over()
 
-    def _changed(self, changes: list[Parameter]) -> Sets:
+    def _changed(self, changes: list[Parameter]) -> parameters.Sets:
         return self._table.build({**self._table.values(self.accepted), **{
             change.name: parameters.plain(change.value) for change in changes
             if change.name in self._table.fields}})

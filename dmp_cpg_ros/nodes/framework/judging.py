@@ -21,7 +21,10 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from functools import lru_cache, partial
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 
 Compute = Callable[[], Any]
 """What is computed: a function without arguments that can be pickled."""
@@ -101,6 +104,26 @@ class Judge:
 def judge() -> Judge:
     """The one of this process, whatever nodes it has."""
     return Judge()
+
+
+def beside_ticks(node: SuiteNode, compute: Compute, use: Use) -> None:
+    """Have something computed that takes longer than a tick of a node, and use it between two.
+
+    In lock-step, where the robot waits, and without an executor it is computed at once; so it is
+    where it cannot be done elsewhere.
+    """
+    if node.lock_step or node.executor is None:
+        use(compute())
+    else:
+        judge().ask(compute, partial(_computed, node, compute, use))
+
+
+def _computed(node: SuiteNode, compute: Compute, use: Use, result: Any) -> None:
+    """Pass on, from another thread, what was computed."""
+    executor = node.executor
+    if executor is not None:  # else the node has ended
+        executor.create_task(node.guarded('beside ticks', lambda: use(
+            compute() if isinstance(result, Exception) else result)))
 
 
 def main() -> None:

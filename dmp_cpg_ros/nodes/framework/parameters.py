@@ -32,9 +32,11 @@ POLICIES = (BATCH, NORMAL)
 
 P = TypeVar('P', bound=Parameters)
 
+Sets = Mapping[type[Any], Any]
+"""Parameter sets by their class."""
+
 FOREIGN_PREFIXES = ('use_sim_time', 'qos_overrides.', 'start_type_description_service')
 """Parameters that rclpy itself declares."""
-
 
 RELIABLE, BEST_EFFORT = 'reliable', 'best_effort'
 

@@ -23,10 +23,10 @@ from dmp_cpg_ros.core.clock import TickClock
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.nodes.framework import parameters
-from dmp_cpg_ros.nodes.framework.certified import Certified, Sets
+from dmp_cpg_ros.nodes.framework.certified import Certified
 from dmp_cpg_ros.nodes.framework.changes import ParameterChanges
+from dmp_cpg_ros.nodes.framework.commands import Commands
 from dmp_cpg_ros.nodes.framework.health import missing_connections
-from dmp_cpg_ros.nodes.framework.judging import Compute, Use, judge
 from dmp_cpg_ros.nodes.framework.lifecycle import GuardedLifecycleNode
 from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery, SuitePublisher
 from dmp_cpg_ros.nodes.framework.ticks import TickInputs, drain
@@ -40,7 +40,7 @@ from dmp_cpg_ros.nodes.messages.interfaces import (
     interface,
     partners,
 )
-from dmp_cpg_ros.nodes.messages.values import counts_message, header_ns
+from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.suite_table import KINDS
 
 WATCH_EVERY_S = 0.5
@@ -103,14 +103,12 @@ class SuiteNode(GuardedLifecycleNode):
         """Create the node and check its parameters; raises ParameterError for a bad one."""
         super().__init__(name or self.KIND, **options)
         self.parameter_changes = ParameterChanges(self)
-        self._sets: Sets = self.parameter_changes.accepted
+        self._sets: parameters.Sets = self.parameter_changes.accepted
         self._undo: list[Callable[[], object]] = []
         self._said: list[Callable[[], None]] = []
-        self._commands: list[Subscription] = []
         self._not_waking: dict[str, Subscription] = {}
-        self._commands_taken: dict[str, int] = {}
         self._inputs: list[tuple[Interface, Subscription]] = []
-        self.writers = TopicWriters(self)
+        self.writers, self._commands = TopicWriters(self), Commands(self)
         topic, ready = interface('/diagnostics'), interface('~/ready')
         self._diagnostics = self.create_publisher(topic.type, topic.name, topic.publisher_qos)
         self._outputs: list[tuple[Interface, Publisher]] = [(topic, self._diagnostics)]
@@ -143,7 +141,7 @@ class SuiteNode(GuardedLifecycleNode):
     def on_parameters(self) -> None:
         """Take over changed parameters from :meth:`parameters_of`, at the start of a tick."""
 
-    def check_parameters(self, sets: Sets) -> None:
+    def check_parameters(self, sets: parameters.Sets) -> None:
         """Raise ParameterError to refuse a change that every field by itself would allow."""
         if self.certified is not None:
             self.certified.check(sets)
@@ -270,7 +268,7 @@ class SuiteNode(GuardedLifecycleNode):
             self._undo.append(partial(self.local.detach, receive))
             return None
         if command:
-            receive = self._counted(topic.name, take)
+            receive = self._commands.counted(topic.name, take)
         elif watched:
             receive = self.writers.only(topic, callback, read)
         usual = topic.lossy_qos if self.lossy else topic.reader_qos
@@ -281,7 +279,7 @@ class SuiteNode(GuardedLifecycleNode):
         self._undo.append(partial(self.destroy_subscription, subscription))
         self._inputs.append((topic, subscription))
         if command:
-            self._commands.append(subscription)
+            self._commands.add(topic, subscription)
         if not wakes:
             self._not_waking[topic.name] = subscription
         return subscription
@@ -333,7 +331,8 @@ class SuiteNode(GuardedLifecycleNode):
             self.certified = None
         for undo in reversed(self._undo):
             undo()
-        self._undo, self._commands, self._inputs, self._not_waking = [], [], [], {}
+        self._undo, self._inputs, self._not_waking = [], [], {}
+        self._commands.forget()
         self.writers.forget()
         self._outputs = self._outputs[:1]
 
@@ -342,22 +341,6 @@ class SuiteNode(GuardedLifecycleNode):
         outputs = [(topic, self.readers(topic), publisher) for topic, publisher in self._outputs]
         return missing_connections(self, self.KIND, outputs, self._inputs,
                                    self.parameters_of(parameters.NodeParameters).expected_nodes)
-
-    def _counted(self, topic: str, callback: Callable[[Any], None]) -> Callable[..., None]:
-        """Say how many commands have been taken: who has sent them may wait for it."""
-        counts = self._commands_taken
-        counts.setdefault(topic, 0)
-        if not self._commands:
-            self._taken = self.publisher('~/commands_taken')
-
-        def receive(message: Any) -> None:
-            try:
-                callback(message)
-            finally:
-                counts[topic] += 1
-                self._taken.publish(counts_message(counts))
-
-        return self.writers.numbered(topic, receive)
 
     # Ticks -------------------------------------------------------------------------------------
 
@@ -409,8 +392,7 @@ class SuiteNode(GuardedLifecycleNode):
         """Start a tick: waiting commands are taken and changed parameters take effect."""
         self.health.ticks += 1
         self.health.stamp_ns = stamp_ns
-        for subscription in self._commands:
-            drain(subscription)
+        self._commands.take()
         if self.parameter_changes.accepted is not self._sets:
             self._sets = self.parameter_changes.accepted
             self.on_parameters()
@@ -420,26 +402,8 @@ class SuiteNode(GuardedLifecycleNode):
         report.
         """
         if self.health.due():
-            self._watch_command_types()
+            self._commands.watch_types()
             self.report(periodic=True)
-
-    def beside_ticks(self, compute: Compute, use: Use) -> None:
-        """Have something computed that takes longer than a tick, and use it between two ticks.
-
-        In lock-step, where the robot waits, and without an executor it is computed at once; so it
-        is where it cannot be done elsewhere.
-        """
-        if self.lock_step or self.executor is None:
-            use(compute())
-        else:
-            judge().ask(compute, partial(self._computed, compute, use))
-
-    def _computed(self, compute: Compute, use: Use, result: Any) -> None:
-        """Pass on, from another thread, what was computed."""
-        executor = self.executor
-        if executor is not None:  # else the node has ended
-            executor.create_task(self.guarded('beside ticks', lambda: use(
-                compute() if isinstance(result, Exception) else result)))
 
     def _run_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         self.elapsed = self._clock_of_ticks.step(stamp_ns)
@@ -482,20 +446,6 @@ class SuiteNode(GuardedLifecycleNode):
         """Withdraw a warning."""
         if self.health.clear_problem(key):
             self.report()
-
-    def _watch_command_types(self) -> None:
-        """Warn of publishers of commands whose type no reader can match: DDS says nothing."""
-        for topic, subscription in self._inputs:
-            if subscription not in self._commands:
-                continue
-            name = subscription.topic_name
-            types = {end.topic_type for end in self.get_publishers_info_by_topic(name)}
-            wrong = ', '.join(sorted(types - {topic.type_name}))
-            if wrong:
-                self.warn(f'type of {name}', f'{name} is published as {wrong}, and this node '
-                          f'reads {topic.type_name}{topic.other_type}')
-            else:
-                self.clear(f'type of {name}')
 
     def _answer_ready(self, request: Any, response: Any) -> Any:
         problems = [] if self.active else [f'{self.get_name()} is {self.state_label}']
