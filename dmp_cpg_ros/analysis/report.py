@@ -17,16 +17,16 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.facts import facts
-from dmp_cpg_ros.analysis.figures import drawings, style
+from dmp_cpg_ros.analysis.figures import gait, robot, style
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.strict_json import to_json
 from dmp_cpg_ros.analysis.tables import as_text, flattened
 
 CATALOGUE = (
-    drawings.target_kinematics, drawings.canonical_states, drawings.phase_portrait,
-    drawings.footfall, drawings.path, drawings.speed_tracking, drawings.attitude,
-    drawings.estimation, drawings.torques, drawings.timing)
+    gait.target_kinematics, gait.canonical_states, gait.phase_portrait, gait.footfall,
+    robot.path, robot.speed_tracking, robot.attitude, robot.estimation, robot.torques,
+    robot.timing)
 """The figures, in their order."""
 
 

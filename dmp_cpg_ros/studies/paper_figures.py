@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws the paper's figures from simulations: oscillators by themselves, and the walking robot.
 
-Figures 5 and 7 are those of the report, in :mod:`~dmp_cpg_ros.analysis.figures.drawings`.
+Figures 5 and 7 are those of the report, in :mod:`~dmp_cpg_ros.analysis.figures.gait`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Patch
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.figures import drawings, style
+from dmp_cpg_ros.analysis.figures import style
+from dmp_cpg_ros.analysis.figures.gait import canonical_states, target_kinematics
 from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
@@ -314,7 +315,7 @@ def figures(suite: Suite) -> Iterator[tuple[str, Figure]]:
     context = RunContext(robot.description, suite.gait, suite.parameters.inhibition,
                          suite.parameters.canonical.radius)
     recording = experiment(suite, robot)
-    for draw in (drawings.target_kinematics, drawings.canonical_states):
+    for draw in (target_kinematics, canonical_states):
         figure = draw(recording, context)
         if figure is not None:
             yield draw.__name__, figure

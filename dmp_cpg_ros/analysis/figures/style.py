@@ -19,7 +19,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.analysis.episodes import STOPPING, episodes, requested_stops
+from dmp_cpg_ros.analysis.episodes import (
+    STOPPING,
+    episodes,
+    gait_period,
+    requested_stops,
+    steady_segments,
+)
 from dmp_cpg_ros.analysis.motion import spans, thinned
 from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -198,6 +204,15 @@ def stop_window(recording: Recording, around: float = 2.5, longest: float = 14.0
         start = max(first, stop.start - around)
         return start, min(last, stop.end + around, start + longest)
     return max(first, last - 2 * around), last
+
+
+def steady_window(recording: Recording, cycles: int) -> Window | None:
+    """Last cycles of the first steady walking, None when there is none [s]."""
+    segments, period = steady_segments(recording), gait_period(recording)
+    if not segments or period is None:
+        return None
+    start, end = segments[0]
+    return max(start, end - cycles * period), end
 
 
 def rows_in(time: Array, window: Window) -> NDArray[np.bool_]:
