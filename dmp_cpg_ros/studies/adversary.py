@@ -27,16 +27,9 @@ from dmp_cpg_ros.core.canonical.inhibition import AUTO
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.studies import adversary_networks, adversary_rows
-from dmp_cpg_ros.studies.adversary_suite import (
-    CONDITIONS,
-    Oscillators,
-    play,
-    random_events,
-    setting,
-    smaller,
-    varied,
-)
+from dmp_cpg_ros.studies.adversary_suite import play, random_events, setting, smaller, varied
 from dmp_cpg_ros.studies.draws import Case, smallest
+from dmp_cpg_ros.studies.oscillator_loop import CONDITIONS, Oscillators
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_suite
 

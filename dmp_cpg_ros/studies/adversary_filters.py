@@ -16,8 +16,8 @@ from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSyst
 from dmp_cpg_ros.core.reference.stop_distance import slowing_time, stop_distance
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.transformation.foot_path import activity_step
-from dmp_cpg_ros.studies.adversary_suite import Oscillators
 from dmp_cpg_ros.studies.draws import Case, Judged, log_uniform
+from dmp_cpg_ros.studies.oscillator_loop import Oscillators
 
 _RATE = 1.1
 """Factor by which rates are taken for more than they are where a row is left out."""

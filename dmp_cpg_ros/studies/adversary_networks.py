@@ -28,8 +28,9 @@ from dmp_cpg_ros.core.contraction.synchronisation import (
 )
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.studies.adversary_runs import EVENTS, TICKS, Certified, Network, Runs, Setting
+from dmp_cpg_ros.studies.adversary_runs import EVENTS, TICKS, Certified, Network, Runs
 from dmp_cpg_ros.studies.draws import Case, both_ways, log_uniform, random_edges
+from dmp_cpg_ros.studies.network_batch import Setting
 
 WEAKENED = ('synchronisation', 'contraction', 'capture', 'time_step', 'cycle_radius',
             'region_per_tick', 'places', 'holding')

@@ -19,11 +19,11 @@ from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.studies import adversary_networks, delays
-from dmp_cpg_ros.studies.adversary_runs import Batch, Setting
 from dmp_cpg_ros.studies.adversary_stops import suite_case
-from dmp_cpg_ros.studies.adversary_suite import Oscillators
 from dmp_cpg_ros.studies.delayed_runs import PATTERNS, fails
 from dmp_cpg_ros.studies.draws import Case, Judged, log_uniform
+from dmp_cpg_ros.studies.network_batch import Batch, Setting
+from dmp_cpg_ros.studies.oscillator_loop import Oscillators
 
 
 def draw_frequencies(rng: np.random.Generator, weaken: bool) -> Case:

@@ -17,8 +17,8 @@ from dmp_cpg_ros.core.inhibition.entry import SMALLEST_RADIUS
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import FootPath
-from dmp_cpg_ros.studies.adversary_suite import GAITS, Oscillators
 from dmp_cpg_ros.studies.draws import Case, Judged, log_uniform
+from dmp_cpg_ros.studies.oscillator_loop import GAITS, Oscillators
 
 _FAST = {'alpha_r': 10.0, 'activity_rate': 50.0, 'auto_inhibit': False, 'push_recovery': False}
 """Parameters with which a run is short."""

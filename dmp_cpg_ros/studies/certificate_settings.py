@@ -28,8 +28,8 @@ from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.leg import LegParameters
-from dmp_cpg_ros.studies.adversary_runs import Setting
 from dmp_cpg_ros.studies.draws import log_uniform, random_edges
+from dmp_cpg_ros.studies.network_batch import Setting
 from dmp_cpg_ros.suite import load_gaits
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring', 'directed')

@@ -12,8 +12,9 @@ from core_examples import quadruped
 
 from dmp_cpg_ros.studies import adversary, adversary_networks, adversary_rows
 from dmp_cpg_ros.studies.adversary import FOLLOWING, WEAKENED, main, search
-from dmp_cpg_ros.studies.adversary_suite import CONDITIONS, Oscillators, play, smaller
+from dmp_cpg_ros.studies.adversary_suite import play, smaller
 from dmp_cpg_ros.studies.draws import Case
+from dmp_cpg_ros.studies.oscillator_loop import CONDITIONS, Oscillators
 
 ROBOT = quadruped()
 

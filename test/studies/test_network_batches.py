@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from contraction_batches import random_setting
 
-from dmp_cpg_ros.studies.adversary_runs import Batch
+from dmp_cpg_ros.studies.network_batch import Batch
 
 
 @pytest.mark.parametrize('size', [2, 3, 4, 7, 12])

@@ -10,9 +10,9 @@ from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, graph_from_edges,
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.studies.adversary_runs import Batch, Setting
 from dmp_cpg_ros.studies.certificate_settings import GRAPHS
 from dmp_cpg_ros.studies.draws import random_edges
+from dmp_cpg_ros.studies.network_batch import Batch, Setting
 
 __all__ = ['Batch', 'Setting', 'locked', 'random_graph', 'random_setting']
 

@@ -75,7 +75,8 @@ def stopped(cases: list[Case], rng: np.random.Generator) -> tuple[np.ndarray, np
             at_rest[left[~moving]] = True
             if not np.any(moving):
                 break
-            batch, x, left = batch.subset(moving), x[moving], left[moving]
+            batch.use(batch.rows[moving])
+            x, left = x[moving], left[moving]
     return kept & entered, at_rest
 
 

@@ -11,7 +11,7 @@ import pytest
 from core_examples import TICK, quadruped
 
 from dmp_cpg_ros.core.canonical.phase import phase
-from dmp_cpg_ros.studies.adversary_suite import Oscillators
+from dmp_cpg_ros.studies.oscillator_loop import Oscillators
 
 ROBOT = quadruped()
 

@@ -16,7 +16,7 @@ from dmp_cpg_ros.core.canonical.inhibition import AUTO, InhibitionParameters
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.inhibition.handover import adopted
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.studies.adversary_suite import Oscillators
+from dmp_cpg_ros.studies.oscillator_loop import Oscillators
 
 ROBOT, TICK = quadruped(), 0.004
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
