@@ -195,25 +195,3 @@ class Interval:
 
     def __getitem__(self, key: Any) -> Interval:
         return Interval(self.lower[key], self.upper[key])
-
-
-def stack(rows: list[list[Interval | float]]) -> Interval:
-    """Intervals (…,) of equal shape put together as matrices.
-
-    Parameters
-    ----------
-    rows : list of lists
-        Entries of the matrix, intervals or numbers.
-
-    Returns
-    -------
-    Interval (..., n, m)
-    """
-    entries = [[Interval.of(entry) for entry in row] for row in rows]
-    shape = np.broadcast_shapes(*(entry.lower.shape for row in entries for entry in row))
-
-    def packed(end: str) -> Array:
-        return np.stack([np.stack([np.broadcast_to(getattr(entry, end), shape) for entry in row],
-                                  axis=-1) for row in entries], axis=-2)
-
-    return Interval(packed('lower'), packed('upper'))

@@ -54,11 +54,6 @@ class Finding:
             raise ParameterError(f"grade '{self.grade}' is not known; valid are "
                                  f"{', '.join(GRADES)}")
 
-    @property
-    def contracting(self) -> bool:
-        """Whether the rate is positive."""
-        return self.rate > 0.0
-
 
 def weakest(grades: tuple[str, ...]) -> str:
     """Grade of a conclusion from several premises: that of the weakest."""

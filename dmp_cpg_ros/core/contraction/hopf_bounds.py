@@ -1,7 +1,7 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Closed forms for the Andronov-Hopf oscillator: growth, transverse rate, enclosure of the Jacobian.
+Closed forms for the Andronov-Hopf oscillator: growth and transverse rate.
 
 A_s has the eigenvalues ρ(r² − |x|²) and ρ(r² − 3|x|²), so that growth is largest at the origin,
 ρr². In polar differentials δz = (δr, r δθ)/r the oscillator is ṙ/r = ρ(r₀² − r²), θ̇ = ω: its
@@ -12,13 +12,11 @@ closed form.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
-from dmp_cpg_ros.core.contraction.capture_anywhere import Interval, stack
 from dmp_cpg_ros.core.contraction.finding import PROVED, Finding
 from dmp_cpg_ros.core.contraction.region import Annulus
 from dmp_cpg_ros.core.maths import Array
@@ -89,33 +87,6 @@ def largest_shifted(rho: float, radius: float, distance: Array, farthest: float)
     u = distance / radius
     d = ((1.0 - np.sqrt(1.0 + 6.0 * u**2)) / 3.0).clip(-1.0, (farthest / radius) ** 2 - 1.0)
     return np.asarray(rho * radius**3 * np.sqrt(4.0 * u**2 - 2.0 * u**2 * d - d**2 + d**3))
-
-
-def interval_jacobian(oscillator: AndronovHopf, omega: float) -> Callable[[Interval], Interval]:
-    """Enclosure of A on boxes, what ``proved_contraction`` asks for.
-
-    Parameters
-    ----------
-    oscillator : AndronovHopf
-        Oscillator.
-    omega : float
-        Angular frequency [rad/s].
-
-    Returns
-    -------
-    callable
-        Interval (k, 2) → Interval (k, 2, 2) [1/s].
-    """
-    rho, r_squared = oscillator.rho, Interval.of(oscillator.radius).square()
-
-    def enclosure(x: Interval) -> Interval:
-        x1, x2 = x[..., 0], x[..., 1]
-        first, second = x1.square(), x2.square()
-        shared = -2.0 * rho * (x1 * x2)
-        return stack([[rho * (r_squared - 3.0 * first - second), shared + omega],
-                      [shared - omega, rho * (r_squared - first - 3.0 * second)]])
-
-    return enclosure
 
 
 def transverse_contraction(oscillator: AndronovHopf, omega: float, annulus: Annulus) -> Finding:

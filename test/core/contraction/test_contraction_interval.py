@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.contraction.capture_anywhere import Interval, stack
+from dmp_cpg_ros.core.contraction.capture_anywhere import Interval
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.paper.matrix_measure import stack
 
 NUMBERS = st.floats(-1e6, 1e6, allow_subnormal=False)
 
