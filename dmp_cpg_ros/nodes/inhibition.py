@@ -20,7 +20,7 @@ from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import CanonicalState
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.handover import adopted
-from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead
+from dmp_cpg_ros.core.inhibition.prediction import look_ahead
 from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
@@ -41,6 +41,7 @@ from dmp_cpg_ros.core.voting.voting import Voting
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
 from dmp_cpg_ros.nodes.framework.known_stop import OthersKnow
+from dmp_cpg_ros.nodes.framework.promise import Promise
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader, GaitMemoryWriter
 from dmp_cpg_ros.nodes.messages.commands import read_votes
@@ -59,11 +60,6 @@ HEARTBEAT_NS = 100_000_000
 
 JOIN_EVERY_S = 0.1
 """In lock-step, how often a restarted node looks whether it has been told what acts [s]."""
-
-PATIENT_NS, BRIEF_NS = 5_000_000_000, 400_000_000
-"""Time for which a restarted node waits to be told what acts, longer than the 3 s after which a
-participant announces itself again, and where nobody is to be expected who could tell [ns].
-"""
 
 BLIND_NS = 250_000_000
 """Time on the robot's clock without a tick after which nothing is known of the gait [ns]."""
@@ -92,11 +88,10 @@ class InhibitionNode(SuiteNode):
         self._x: Any = None
         self._x_dot: Any = None
         self._r, self._body_mode = np.zeros(3), 'standing'
-        self._predicted = self._bound = self._way = nan
-        self._outlook: Outlook | None = None
+        self._promise = Promise()
         self._due_ns, self._told_ns, self._blind = inf, -HEARTBEAT_NS, ''
         self._drive, self._joined, self._asked = FOLLOWING, False, False
-        self._first_ns = self._began_ns = -1
+        self._began_ns = -1
         self._held: tuple[int, dict[str, Any]] | None = None
         self._told: tuple[Any, ...] = ()
         self._publisher = self.publisher('inhibition_state')
@@ -210,12 +205,8 @@ class InhibitionNode(SuiteNode):
         the stamp 0. False while it is not known yet: what others know of a stop holds until then.
         """
         now_ns = time.monotonic_ns() if self.lock_step else stamp_ns  # no robot's time passes
-        if self._first_ns < 0:
-            self._first_ns = now_ns
-        if stamp_ns > 0 and not self._others.all_told:
-            patience = PATIENT_NS if self._others.more_may_tell else BRIEF_NS
-            if now_ns - self._first_ns < patience:
-                return False
+        if stamp_ns > 0 and not self._others.have_told(now_ns):
+            return False
         self._adopt(stamp_ns)
         return True
 
@@ -329,21 +320,8 @@ class InhibitionNode(SuiteNode):
             return True, ('stopped already, and steps to catch a push' if steps and stop
                           else f'already {self._state.state}')
         self._predict()
-        when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else 'not within 10 s'
-        most = f'at most {self._bound:.3f} s' if isfinite(self._bound) else (
-            'without a bound from this state')
-        way = (f'; the reference goes on for at most {self._way:.3f} m{self._standing()}' + (
-            '; a push may begin it anew'
-            if self._supervisor.parameters.push_recovery else '')) if stop else ''
-        return True, f'{"at rest" if stop else "walking"} {when}, {most}; {self._words()}{way}'
-
-    def _standing(self) -> str:
-        """When and where the body will stand, of which there is no certificate but trials."""
-        of = self._outlook
-        if of is None or not isfinite(of.time_s):
-            return ''
-        return (f'; the body stands in about {of.stands_s:.2f} s, by trials within '
-                f'{of.stands_within_s:.2f} s and {of.stands_within_m:.2f} m')
+        return True, self._promise.words(
+            stop, self._words(), self._supervisor.parameters.push_recovery)
 
     def _predict(self) -> None:
         """Look ahead to the rest or the walk that was just requested."""
@@ -351,25 +329,25 @@ class InhibitionNode(SuiteNode):
         canon = CanonicalState(
             gait, self.certified.gaits.named(gait_name(self)), self._slow.gait.cadence_scale,
             self._x, self._x_dot, initial_contact_state())
-        self._outlook = outlook = look_ahead(
+        outlook = look_ahead(
             self._supervisor, self._reference, self._running_gait, self._state, self._acting,
             canon, self._r, self._gate.at(self._state.time_ns),
             self.parameters_of(TickParameters).tick_ns * 1e-9, body_mode=self._body_mode)
-        self._predicted = outlook.time_s
+        predicted = outlook.time_s
         if isfinite(self._state.measured_s):  # released by a push in full swing: it runs already
-            self._predicted = self._state.measured_s
+            predicted = self._state.measured_s
         running = self.certified.running_in(gait)
-        self._way = running.stop_distance(
+        way = running.stop_distance(
             self._r, self._gate.at(self._state.time_ns)) if self._state.requested else nan
         if self._state.requested and self._state.voted:
-            self._bound = self._bound_by_votes()
+            bound = self._bound_by_votes()
         elif self._state.requested:
-            self._bound = running.time_to_rest(
-                self._slow, self._x, self._r, self._state.quickness)
+            bound = running.time_to_rest(self._slow, self._x, self._r, self._state.quickness)
         else:
-            self._bound = self.certified.certificate_in(gait).time_to_walking
-        requested = self._state.requested and isfinite(self._bound)
-        self._due_ns = self._state.time_ns + 1e9 * self._bound if requested else inf
+            bound = self.certified.certificate_in(gait).time_to_walking
+        self._promise = Promise(predicted, bound, way, outlook)
+        requested = self._state.requested and isfinite(bound)
+        self._due_ns = self._state.time_ns + 1e9 * bound if requested else inf
 
     def _bound_by_votes(self) -> float:
         """Bound on the time from now to rest under the votes [s]."""
@@ -398,13 +376,14 @@ class InhibitionNode(SuiteNode):
 
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()
+        promise = self._promise
         told = {'requested': state.in_force, 'armed': state.armed, 'automatic': state.automatic,
                 'pushed': state.push.acts, 'blocked': state.block.acts,
                 **_by_leg('gain', acting.gains), 'region_radius': acting.region_radius,
                 'rest_phase': acting.rest_phase,
-                'request_stamp': state.request_ns * 1e-9, 'predicted_s': self._predicted,
-                'bound_s': self._bound, 'bound_m': self._way,
-                'stands_s': self._outlook.stands_s if self._outlook else nan,
+                'request_stamp': state.request_ns * 1e-9, 'predicted_s': promise.predicted_s,
+                'bound_s': promise.bound_s, 'bound_m': promise.bound_m,
+                'stands_s': promise.stands_s,
                 'measured_s': state.measured_s,
                 'certified': self.certified.certificate_in(self._network.gait).holds,
                 'grade': self._words()}

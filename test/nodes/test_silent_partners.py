@@ -19,7 +19,8 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
-from dmp_cpg_ros.nodes.inhibition import BRIEF_NS, PATIENT_NS, InhibitionNode
+from dmp_cpg_ros.nodes.framework.known_stop import BRIEF_NS, PATIENT_NS
+from dmp_cpg_ros.nodes.inhibition import InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
 from dmp_cpg_ros.nodes.messages.values import header_ns

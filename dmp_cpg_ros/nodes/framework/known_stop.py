@@ -26,6 +26,11 @@ Heard = Callable[[int, Inhibition], None]
 TELLERS = ('acting_gains', 'kept_gains')
 """Topics on which it is told what is known."""
 
+PATIENT_NS, BRIEF_NS = 5_000_000_000, 400_000_000
+"""Time for which a restarted node waits to be told what acts, longer than the 3 s after which a
+participant announces itself again, and where nobody is to be expected who could tell [ns].
+"""
+
 
 class KnownStop:
     """The newest that a node knows of the inhibition, told when it changes.
@@ -84,17 +89,20 @@ class OthersKnow:
         """Listen."""
         self.newest: tuple[int, Inhibition] | None = None
         self._node, self._silent, self._news = node, set(TELLERS), news
+        self._asked_ns = -1
         listen(node, TELLERS, self.hear)
 
-    @property
-    def all_told(self) -> bool:
-        """Whether everybody who can tell has."""
-        return not self._silent
+    def have_told(self, now_ns: int) -> bool:
+        """Whether everybody who can tell has, or has had time to since this was asked first."""
+        if self._asked_ns < 0:
+            self._asked_ns = now_ns
+        patience = PATIENT_NS if self.more_may_tell else BRIEF_NS
+        return not self._silent or now_ns - self._asked_ns >= patience
 
     @property
     def more_may_tell(self) -> bool:
         """Whether somebody who can tell has not: one is in the graph, or no robot is there yet."""
-        return not self.all_told and (
+        return bool(self._silent) and (
             any(map(self._node.count_publishers, self._silent))
             or not self._node.count_publishers('joint_states'))
 

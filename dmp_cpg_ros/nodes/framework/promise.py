@@ -1,0 +1,52 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is promised of a stop or a start that was just requested."""
+
+from __future__ import annotations
+
+from math import isfinite, nan
+from typing import NamedTuple
+
+from dmp_cpg_ros.core.inhibition.prediction import Outlook
+
+
+class Promise(NamedTuple):
+    """When a request will be fulfilled.
+
+    Attributes
+    ----------
+    predicted_s, bound_s : float
+        Time to rest or to walking as predicted, and its certified bound [s]; not finite where
+        there is none.
+    bound_m : float
+        Way of the reference until rest, at most [m]; NaN for a start.
+    outlook : Outlook or None
+        What is predicted of the body.
+    """
+
+    predicted_s: float = nan
+    bound_s: float = nan
+    bound_m: float = nan
+    outlook: Outlook | None = None
+
+    @property
+    def stands_s(self) -> float:
+        """Time until the body stands [s]."""
+        return self.outlook.stands_s if self.outlook else nan
+
+    def words(self, stop: bool, certificate: str, push_recovery: bool) -> str:
+        """Say it, with the certificate in a few words; and whether pushes begin the gait anew."""
+        when = f'in {self.predicted_s:.3f} s' if isfinite(self.predicted_s) else 'not within 10 s'
+        most = f'at most {self.bound_s:.3f} s' if isfinite(self.bound_s) else (
+            'without a bound from this state')
+        way = (f'; the reference goes on for at most {self.bound_m:.3f} m{self._standing()}' + (
+            '; a push may begin it anew' if push_recovery else '')) if stop else ''
+        return f'{"at rest" if stop else "walking"} {when}, {most}; {certificate}{way}'
+
+    def _standing(self) -> str:
+        """When and where the body will stand, of which there is no certificate but trials."""
+        of = self.outlook
+        if of is None or not isfinite(of.time_s):
+            return ''
+        return (f'; the body stands in about {of.stands_s:.2f} s, by trials within '
+                f'{of.stands_within_s:.2f} s and {of.stands_within_m:.2f} m')
