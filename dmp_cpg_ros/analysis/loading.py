@@ -58,8 +58,9 @@ def load_recording(path: Path | str, *, only: Mapping[str, Sequence[str]] | None
         return _loaded(find_bag(path), {**FIELDS, **(only or {})}, tell)
 
 
-def _loaded(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str], None]
-            ) -> Recording:
+def _read(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str], None]
+          ) -> tuple[dict[str, Topic], dict[str, int]]:
+    """Topics of a bag, and how many messages it has of each topic."""
     with opened(bag) as reader:
         robots = sorted(topic for topic in reader.topics if base_name(topic) == 'joint_states')
         if len(robots) > 1:
@@ -83,6 +84,12 @@ def _loaded(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str]
         for key, of in waiting.items():
             topics[base_name(key[0])].take(*key, *of)
         counts = {topic: info.msgcount for topic, info in sorted(reader.topics.items())}
+    return topics, counts
+
+
+def _loaded(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str], None]
+            ) -> Recording:
+    topics, counts = _read(bag, fields, tell)
     skipped = Counter[str]()
     for topic in topics.values():
         skipped += topic.skipped

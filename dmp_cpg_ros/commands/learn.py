@@ -12,8 +12,9 @@ from time import perf_counter
 
 import numpy as np
 
-from dmp_cpg_ros.commands.demonstration_files import read_demonstration, read_motion
+from dmp_cpg_ros.commands.demonstration_files import read_demonstration
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.commands.walked_motion import read_motion
 from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.learning import discrete, period, rhythmic

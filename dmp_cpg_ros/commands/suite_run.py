@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import rclpy
@@ -80,14 +80,8 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
                 views.start('live_view', ['live_view', *arguments], logged=False)
             if visualization:
                 views.start(VISUALIZATION, [VISUALIZATION, *arguments])
-            kinds = {name: kind.name for kind, name, _ in instances()}
             shared = {RECORDER: (RECORDER,), **PROCESSES[processes]}
-            for process, nodes in shared.items():
-                if len(nodes) == 1:
-                    node = ('-r', f'__node:={nodes[0]}')
-                    group.start(process, [kinds[nodes[0]], *arguments, *node])
-                else:
-                    group.start(process, [COMPOSED, *nodes, *arguments])
+            _start(group, shared, arguments)
             if not respawn:
                 server.close()
             player = ScenarioPlayer(scenario, tick_ns, lock_step, say)
@@ -114,3 +108,15 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
         if killed:
             raise SuiteError(f'{", ".join(killed)} hung: no answer at the end of the run')
     return watch.unrecorded
+
+
+def _start(group: ProcessGroup, shared: Mapping[str, Sequence[str]], arguments: Sequence[str]
+           ) -> None:
+    """Start every process with its nodes."""
+    kinds = {name: kind.name for kind, name, _ in instances()}
+    for process, nodes in shared.items():
+        if len(nodes) == 1:
+            node = ('-r', f'__node:={nodes[0]}')
+            group.start(process, [kinds[nodes[0]], *arguments, *node])
+        else:
+            group.start(process, [COMPOSED, *nodes, *arguments])
