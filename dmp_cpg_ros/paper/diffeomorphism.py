@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.canonical.phase import phase, state_at
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.learning.period import fourier_series
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
-from dmp_cpg_ros.paper.jacobians import Array, difference_jacobian, numerical_jacobian
+from dmp_cpg_ros.paper.jacobians import Array, numerical_jacobian
 
 _SMALLEST_PIECE = 2.0**-20
 _GRID = 2.0 * np.pi * np.arange(513) / 512
@@ -87,72 +87,6 @@ class FunctionDiffeomorphism(Diffeomorphism):
             return np.asarray(self.inverse_function(y_prime), dtype=float)
         start = y_prime if guess is None else guess
         return newton_inverse(self.forward, self.jacobian, y_prime, start)
-
-
-@dataclass(frozen=True)
-class Composition(Diffeomorphism):
-    """T = T_k ∘ … ∘ T_1; the first of the list acts first.
-
-    Attributes
-    ----------
-    parts : tuple of Diffeomorphism
-    """
-
-    parts: tuple[Diffeomorphism, ...]
-
-    def forward(self, y: Array) -> Array:
-        """T(y)."""
-        for part in self.parts:
-            y = part.forward(y)
-        return y
-
-    def jacobian(self, y: Array) -> Array:
-        """J(y) by the chain rule."""
-        J = np.eye(len(y))
-        for part in self.parts:
-            J, y = part.jacobian(y) @ J, part.forward(y)
-        return J
-
-    def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
-        """T⁻¹(y'), part by part."""
-        guesses = [guess]
-        for part in self.parts[:-1]:
-            guess = None if guess is None else part.forward(guess)
-            guesses.append(guess)
-        for part, near in zip(reversed(self.parts), reversed(guesses), strict=True):
-            y_prime = part.inverse(y_prime, near)
-        return y_prime
-
-
-@dataclass(frozen=True)
-class TangentLift(Diffeomorphism):
-    """The map (y, v) → (T(y), J(y) v) on ℝ²ⁿ that T induces on positions and velocities.
-
-    Attributes
-    ----------
-    base : Diffeomorphism
-        T on ℝⁿ.
-    """
-
-    base: Diffeomorphism
-
-    def forward(self, y: Array) -> Array:
-        """(T(y), J v)."""
-        position, velocity = np.split(np.asarray(y, dtype=float), 2)
-        return np.append(self.base.forward(position), self.base.velocity(position, velocity))
-
-    def jacobian(self, y: Array) -> Array:
-        """[[J, 0], [∂(J v)/∂y, J]]; the lower left block by differences of J along v."""
-        position, velocity = np.split(np.asarray(y, dtype=float), 2)
-        J = self.base.jacobian(position)
-        bend = difference_jacobian(lambda at: self.base.jacobian(at) @ velocity, position)
-        return np.block([[J, np.zeros_like(J)], [bend, J]])
-
-    def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
-        """(T⁻¹(y'), J⁻¹ v')."""
-        position, velocity = np.split(np.asarray(y_prime, dtype=float), 2)
-        y = self.base.inverse(position, None if guess is None else np.split(guess, 2)[0])
-        return np.append(y, np.linalg.solve(self.base.jacobian(y), velocity))
 
 
 def newton_inverse(forward: Callable[[Array], Array], jacobian: Callable[[Array], Array],

@@ -104,9 +104,9 @@ class Batch:
         n_end = nonlinear(_times(end, flat, n0, n_half) + c)
         return np.asarray((_times(final, flat, n0, n_half, n_end) + c).reshape(x.shape))
 
-    def speed(self, x: Array, armed: bool | NDArray[np.bool_] = True) -> Array:
+    def speed(self, x: Array) -> Array:
         """Largest |ẋ_i| of each state, by its own vector field."""
-        acting = self.inside(x) & armed
+        acting = self.inside(x)
         return np.array([np.linalg.norm(s.system.field(x[k], s.omega, s.gains * acting[k]),
                                         axis=1).max() for k, s in enumerate(self.settings)])
 
