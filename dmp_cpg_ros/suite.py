@@ -15,9 +15,10 @@ from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.parameters import shown
+from dmp_cpg_ros.core.robot_model.grounds import World
 from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
-from dmp_cpg_ros.core.robot_model.world import World, WorldParameters
+from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.primitive_files import load_motion
 from dmp_cpg_ros.suite_table import KINDS, LEG, ROBOT, WALKING

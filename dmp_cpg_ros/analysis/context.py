@@ -11,7 +11,7 @@ from typing import Any
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.world import World
+from dmp_cpg_ros.core.robot_model.grounds import World
 
 CONTACT_WEIGHT_SHARE = 0.02
 """A foot is on the ground while it carries more than this share of the weight."""

@@ -23,7 +23,8 @@ from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.world import World, WorldParameters
+from dmp_cpg_ros.core.robot_model.grounds import World
+from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.suite import load_gait, load_gaits, node_sets
 from dmp_cpg_ros.suite_table import RECORDER, instances
 

@@ -21,8 +21,9 @@ from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.modes.manager import ModeParameters
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.robot_model.grounds import World
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.robot_model.world import World, WorldParameters
+from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.core.transformation.foot_path import Motion
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.core.voting.parameters import VoteSourceParameters, VotingParameters

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
-from dmp_cpg_ros.core.robot_model.world import Surface, World
+from dmp_cpg_ros.core.robot_model.grounds import Surface, World
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 
 _log = logging.getLogger(__name__)

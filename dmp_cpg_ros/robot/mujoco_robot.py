@@ -15,10 +15,11 @@ from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.maths.vec3 import rotation
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.grounds import World
 from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
-from dmp_cpg_ros.core.robot_model.world import World, height_over_ground
+from dmp_cpg_ros.core.robot_model.world import height_over_ground
 from dmp_cpg_ros.core.scenario.push import HOLD_NS, Push, PushForce, PushQueue
 from dmp_cpg_ros.robot import model_parts
 from dmp_cpg_ros.robot.joint_drive import JointDrive

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.certificates.step import STEP_ERROR, mild_rate
+from dmp_cpg_ros.core.certificates.step import STEP_ERROR
 from dmp_cpg_ros.core.contraction.capture import CaptureSet
-from dmp_cpg_ros.core.contraction.hopf_bounds import growth
+from dmp_cpg_ros.core.contraction.hopf_bounds import growth, mild_rate
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.studies.draws import Case
 from dmp_cpg_ros.studies.network_batch import Batch, Setting

@@ -36,9 +36,9 @@ from dmp_cpg_ros.core.canonical.inhibition import AUTO
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.robot_model.grounds import World
 from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot

@@ -23,9 +23,10 @@ from dmp_cpg_ros.core.errors import MissingFileError
 from dmp_cpg_ros.core.estimation.estimator import estimated_state
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.loop import Array, WalkingLoop
+from dmp_cpg_ros.core.robot_model.grounds import Steps, World
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.robot_model.state import RobotState
-from dmp_cpg_ros.core.robot_model.world import WORLDS, Steps, World
+from dmp_cpg_ros.core.robot_model.world import WORLDS
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies.loop_recording import LoopRun, Velocity, recording_of, suite_of
 from dmp_cpg_ros.suite import load_gaits

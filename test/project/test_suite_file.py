@@ -11,7 +11,7 @@ import pytest
 
 from dmp_cpg_ros.configuration import find_config, load_yaml
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.robot_model.world import Blocks
+from dmp_cpg_ros.core.robot_model.grounds import Blocks
 from dmp_cpg_ros.suite import load_gaits, load_suite, node_sets
 from dmp_cpg_ros.suite_table import WALKING, Kind
 

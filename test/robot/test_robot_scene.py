@@ -16,8 +16,9 @@ pytest.importorskip('mujoco')
 
 from dmp_cpg_ros import __file__ as package
 from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.robot_model.grounds import World
 from dmp_cpg_ros.core.robot_model.state import JointTargets
-from dmp_cpg_ros.core.robot_model.world import World, WorldParameters
+from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.scene import FIELD_SIDE, Scene

@@ -15,9 +15,9 @@ from core_examples import GAITS, TICK, suite_parameters
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimate
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw
+from dmp_cpg_ros.core.robot_model.grounds import Slope
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import RobotState
-from dmp_cpg_ros.core.robot_model.world import Slope
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot, SensorNoise

@@ -17,22 +17,8 @@ from numpy.typing import ArrayLike
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.parameters import Parameters, parameter, shown
-from dmp_cpg_ros.core.robot_model.grounds import (
-    PATCH,
-    Blocks,
-    Box,
-    LowFriction,
-    Slope,
-    Steps,
-    Surface,
-    World,
-    as_of,
-)
+from dmp_cpg_ros.core.robot_model.grounds import Blocks, LowFriction, Slope, Steps, World, as_of
 from dmp_cpg_ros.core.robot_model.rough_grounds import Gaps, Hills, RoughSlope
-
-__all__ = ['PATCH', 'PREFIX', 'WORLDS', 'Blocks', 'Box', 'Gaps', 'Hills', 'LowFriction',
-           'RoughSlope', 'Slope', 'Steps', 'Surface', 'World', 'WorldParameters',
-           'height_over_ground', 'world_overrides']
 
 WORLDS: dict[str, type[World]] = {'flat': World, 'slope': Slope, 'blocks': Blocks, 'steps': Steps,
                                   'low_friction': LowFriction, 'rough_slope': RoughSlope,

@@ -13,11 +13,7 @@ from dmp_cpg_ros.core.gait.known_gaits import KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.messages import cdr
-from dmp_cpg_ros.nodes.messages.joint_states import (
-    AnyJointState,
-    JointStateReader,
-    JointStateWriter,
-)
+from dmp_cpg_ros.nodes.messages.joint_states import AnyJoints, JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.messages.values import Array
 
 _OSCILLATORS = slice(0, len(layouts.OSCILLATOR_ROWS))
@@ -82,7 +78,7 @@ class CanonicalStateReader:
         self._reader = JointStateReader(rows, cdr.FIELDS[:2])
         self._last: tuple[bytes, GaitInForce] | None = None
 
-    def read(self, message: AnyJointState) -> tuple[Array, Array, GaitInForce]:
+    def read(self, message: AnyJoints) -> tuple[Array, Array, GaitInForce]:
         """States x and rates ẋ [1/s], ndarrays (4, 2), and the gait in force, the same object
         while it stays; raises DataError.
         """
@@ -133,7 +129,7 @@ class GaitMemoryReader:
         self._canonical = CanonicalStateReader(gaits)
         self._r = JointStateReader(layouts.REFERENCE_ROWS, cdr.FIELDS[:1])
 
-    def read(self, message: AnyJointState) -> tuple[Array, Array, GaitInForce, Array]:
+    def read(self, message: AnyJoints) -> tuple[Array, Array, GaitInForce, Array]:
         """States x and rates ẋ, ndarrays (4, 2), the gait in force, and r, ndarray (3,); raises
         DataError.
         """

@@ -20,11 +20,7 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import INHIBITION
 from dmp_cpg_ros.core.voting.parameters import VotingParameters
 from dmp_cpg_ros.nodes.messages import cdr
-from dmp_cpg_ros.nodes.messages.joint_states import (
-    AnyJointState,
-    JointStateReader,
-    JointStateWriter,
-)
+from dmp_cpg_ros.nodes.messages.joint_states import AnyJoints, JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.messages.values import status_message
 
 
@@ -55,7 +51,7 @@ class InhibitionGainsReader:
         """Prepare the order."""
         self._reader = JointStateReader(layouts.GAIN_ROWS, cdr.FIELDS[:1])
 
-    def read(self, message: AnyJointState) -> Inhibition:
+    def read(self, message: AnyJoints) -> Inhibition:
         """Inhibition that is announced; raises DataError for numbers that no parameters allow."""
         (values,) = self._reader.read(message)
         gains, (radius, rest, *flags, share, quickness) = (

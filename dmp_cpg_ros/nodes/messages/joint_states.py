@@ -15,7 +15,8 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.nodes.messages.cdr import FIELDS, RefilledMessage, SerializedJointState
 from dmp_cpg_ros.nodes.messages.values import Array, checked, sensed
 
-AnyJointState: TypeAlias = JointState | SerializedJointState
+AnyJoints: TypeAlias = JointState | SerializedJointState
+"""As rclpy reads it, or as this package does."""
 
 
 class JointStateReader:
@@ -39,7 +40,7 @@ class JointStateReader:
         self._seen: list[str] = list(names)
         self._index: NDArray[np.intp] | None = None
 
-    def read(self, message: AnyJointState) -> list[Array]:
+    def read(self, message: AnyJoints) -> list[Array]:
         """Arrays (n,) of the needed fields in our order; raises DataError."""
         names = message.name
         size = len(names)

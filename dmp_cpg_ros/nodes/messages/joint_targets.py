@@ -11,11 +11,7 @@ from std_msgs.msg import String
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, JointTargets
 from dmp_cpg_ros.nodes.messages import cdr
-from dmp_cpg_ros.nodes.messages.joint_states import (
-    AnyJointState,
-    JointStateReader,
-    JointStateWriter,
-)
+from dmp_cpg_ros.nodes.messages.joint_states import AnyJoints, JointStateReader, JointStateWriter
 
 DRIVE_MODES = ('following', 'stand', 'lie', 'damp')
 """What ``drive_mode`` can say."""
@@ -54,7 +50,7 @@ class JointTargetsReader:
         self._readers = {leg: JointStateReader(joints_of(leg, names)) for leg in LEGS}
         self.leg_of = {name: leg for leg in LEGS for name in joints_of(leg, names)}
 
-    def read(self, message: AnyJointState) -> tuple[str, JointTargets]:
+    def read(self, message: AnyJoints) -> tuple[str, JointTargets]:
         """Name of the leg and its targets; raises DataError, also for names of no leg."""
         names = message.name
         leg = self.leg_of.get(names[0], '') if names else ''

@@ -14,11 +14,7 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.inhibition.blocked import Progress
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.nodes.messages import cdr
-from dmp_cpg_ros.nodes.messages.joint_states import (
-    AnyJointState,
-    JointStateReader,
-    JointStateWriter,
-)
+from dmp_cpg_ros.nodes.messages.joint_states import AnyJoints, JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.messages.values import Array
 
 _JOINTS = slice(0, len(JOINT_NAMES))
@@ -63,7 +59,7 @@ class PostureFeedbackReader:
         """Prepare the order."""
         self._reader, self._command = JointStateReader(layouts.POSTURE_ROWS), CommandReader()
 
-    def read(self, message: AnyJointState) -> PostureFeedback:
+    def read(self, message: AnyJoints) -> PostureFeedback:
         """Read the feedback; raises DataError."""
         position, velocity, effort = self._reader.read(message)
         return PostureFeedback(
@@ -88,7 +84,7 @@ class CommandReader:
         self._reader = JointStateReader(layouts.POSTURE_ROWS[_COMMAND], cdr.FIELDS[:2])
         self._last: tuple[bytes, BodyCommand] | None = None
 
-    def read(self, message: AnyJointState) -> BodyCommand:
+    def read(self, message: AnyJoints) -> BodyCommand:
         """Read the command only; raises DataError."""
         return self.of(*self._reader.read(message))
 
@@ -109,7 +105,7 @@ class BodyReader:
         self._rows = JointStateReader(
             (*layouts.MARGIN_ROWS, *layouts.PROGRESS_ROWS), cdr.FIELDS[:1])
 
-    def read(self, message: AnyJointState) -> tuple[str, tuple[float, ...], Progress]:
+    def read(self, message: AnyJoints) -> tuple[str, tuple[float, ...], Progress]:
         """Mode of the body, margins of the capture point [m], and progress; raises DataError."""
         (rows,) = self._rows.read(message)
         count = len(layouts.MARGIN_ROWS)

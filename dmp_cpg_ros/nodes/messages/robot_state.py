@@ -18,11 +18,7 @@ from dmp_cpg_ros.core.estimation.estimator import BodyEstimate
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, RobotState
 from dmp_cpg_ros.layouts import work_rows
 from dmp_cpg_ros.nodes.messages import cdr
-from dmp_cpg_ros.nodes.messages.joint_states import (
-    AnyJointState,
-    JointStateReader,
-    JointStateWriter,
-)
+from dmp_cpg_ros.nodes.messages.joint_states import AnyJoints, JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.messages.values import Array, checked, sensed, set_stamp
 
 BASE_FRAME, ODOM_FRAME, WORLD_FRAME = 'base_link', 'odom', 'world'
@@ -145,7 +141,7 @@ class JointsReader:
         self._without_effort = JointStateReader(
             joint_names, ('position', 'velocity'), strict=strict)
 
-    def read(self, message: AnyJointState) -> list[Array]:
+    def read(self, message: AnyJoints) -> list[Array]:
         """Position [rad], velocity [rad/s] and effort [N m] (0 where absent), each (12,)."""
         if len(message.effort):
             return self._full.read(message)
@@ -159,7 +155,7 @@ class FootContactsReader:
         """Prepare the order of the feet."""
         self._reader = JointStateReader(FOOT_NAMES, ('effort',), strict=False)
 
-    def read(self, message: AnyJointState) -> Array:
+    def read(self, message: AnyJoints) -> Array:
         """Normal forces, ndarray (4,) [N]."""
         return self._reader.read(message)[0]
 

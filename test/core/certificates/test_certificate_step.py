@@ -16,9 +16,9 @@ from dmp_cpg_ros.core.certificates.step import (
     STEP_ERROR,
     cycle_radius_error,
     longest_step,
-    mild_rate,
 )
 from dmp_cpg_ros.core.contraction.capture import capture_set
+from dmp_cpg_ros.core.contraction.hopf_bounds import mild_rate
 from dmp_cpg_ros.core.contraction.inhibited import inhibited_contraction
 from dmp_cpg_ros.core.maths.exponential import ExponentialStep
 

@@ -41,7 +41,7 @@ from dmp_cpg_ros.core.inhibition.blocked import (
 )
 from dmp_cpg_ros.core.inhibition.caution import LEAST
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.robot_model.world import Steps
+from dmp_cpg_ros.core.robot_model.grounds import Steps
 from dmp_cpg_ros.studies.walking_trials import Walk
 
 LENGTH = 0.28

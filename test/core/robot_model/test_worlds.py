@@ -12,21 +12,10 @@ import pytest
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.metrics.robot import fell
 from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.robot_model.grounds import PATCH, Blocks, LowFriction, Slope, Steps, World
+from dmp_cpg_ros.core.robot_model.rough_grounds import Gaps, Hills, RoughSlope
 from dmp_cpg_ros.core.robot_model.state import JointTargets
-from dmp_cpg_ros.core.robot_model.world import (
-    PATCH,
-    WORLDS,
-    Blocks,
-    Gaps,
-    Hills,
-    LowFriction,
-    RoughSlope,
-    Slope,
-    Steps,
-    World,
-    WorldParameters,
-    world_overrides,
-)
+from dmp_cpg_ros.core.robot_model.world import WORLDS, WorldParameters, world_overrides
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.robot.camera import Camera
 from dmp_cpg_ros.robot.mujoco_import import mujoco
