@@ -252,24 +252,24 @@ class SuiteNode(GuardedLifecycleNode):
             None when all publishers are in this process.
         """
         topic = topic if isinstance(topic, Interface) else interface(topic)
-        inside = self.local is not None and self.local.kinds.issuperset(topic.publishers)
+        local = self.local
+        inside = local if local is not None and local.kinds.issuperset(topic.publishers) else None
         latched, read = topic.latched, serialized_reader(topic.type, as_message=command)
 
         def take(message: Any) -> None:
             if self.active or latched:
                 callback(message if raw or inside else read(message))
 
-        receive: Callable[..., None] = take
-        watched = not (command or raw) and expected_count(topic.publishers) > 0
-        informed = watched or command
-        if self.local is not None and inside:
-            receive = self.guarded(topic.name, take)
-            self.local.attach(topic.name, receive)
-            self._undo.append(partial(self.local.detach, receive))
+        if inside is not None:
+            guarded = self.guarded(topic.name, take)
+            inside.attach(topic.name, guarded)
+            self._undo.append(partial(inside.detach, guarded))
             return None
+        receive: Callable[..., None] = take
+        informed = command or not raw and expected_count(topic.publishers) > 0
         if command:
             receive = self._commands.counted(topic.name, take)
-        elif watched:
+        elif informed:
             receive = self.writers.only(topic, callback, read)
         usual = topic.lossy_qos if self.lossy else topic.reader_qos
         subscription = self.create_subscription(
