@@ -53,6 +53,7 @@ FIRST_WORD_S = 3.0
 """Waiting that is not worth a word [s]."""
 
 Say = Callable[[float, str], None]
+"""Told at which time [s] what happens."""
 
 
 class SuiteError(DmpCpgError):
@@ -67,11 +68,34 @@ class SuiteWatch:
     made. So all clients whose requests must not be repeated are made first, the player's and those
     for the end of the run; then every node is asked whether it is ready, as often as it takes, and
     its answer proves that it knows the clients that were made before.
+
+    Parameters
+    ----------
+    executor : Executor
+        Runs the player.
+    player : ScenarioPlayer
+        Who plays the scenario.
+    group : ProcessGroup
+        Processes of the nodes.
+    interrupted : list of int
+        Signals that ask for the end, as they come.
+    say : callable (time_s, text)
+        Told what happens.
+    shared : mapping of str to sequence of str
+        Nodes by process.
+    respawn : bool
+        Whether processes that end before their time are started again, all but the robot's.
+
+    Attributes
+    ----------
+    unrecorded : str
+        How the recorder ended before its time; empty where it did not.
     """
 
     def __init__(self, executor: Executor, player: ScenarioPlayer, group: ProcessGroup,
                  interrupted: list[int], say: Say, shared: Mapping[str, Sequence[str]],
                  respawn: bool) -> None:
+        """Create the clients, and hear what is recorded."""
         self._executor, self._player, self._group = executor, player, group
         self._interrupted, self._say = interrupted, say
         self._shared, self._respawn = shared, respawn
