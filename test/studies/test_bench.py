@@ -5,16 +5,20 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 pytest.importorskip('mujoco')
+from dmp_cpg_ros.studies import bench
 from dmp_cpg_ros.studies.bench import main, seconds_of
 
 
 def test_it_prints_and_writes_its_tables(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, capsys: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench, 'seconds_of', partial(seconds_of, repetitions=1, least=1e-6))
     file = tmp_path / 'bench.json'
     assert main(['--sizes', '10', '20', '--json', str(file)]) == 0
     tables = json.loads(file.read_text(encoding='utf-8'))
