@@ -115,7 +115,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def rows(graphs: Sequence[str]) -> Iterator[Row]:
     """All lines of the table for some graphs."""
     for make in (synchronisation_row, capture_row, contraction_row,
-                 partial(contraction_row, omega=SLOW_OMEGA), tube_row,
+                 partial(contraction_row, omega=SLOW_OMEGA), partial(tube_row, omega=OMEGA),
                  partial(tube_row, omega=SLOW_OMEGA), mismatch_row, vote_row, step_row,
                  rest_row):
         yield from map(make, graphs)
@@ -170,6 +170,7 @@ def _walked(system: CanonicalSystem, x: Array, omega: float | Array, steps: int,
     return np.asarray((x[:, 0] - 1j * x[:, 1]) * np.exp(-1j * system.graph.phases))
 
 
+@cache
 def synchronisation_row(graph: str) -> Row:
     """Coupling gain for synchronisation from every state."""
     certified = RHO / synchronisation.synchronisation(network(graph, 1.0).graph, 0.0).connectivity
@@ -209,6 +210,7 @@ def _stops(system: CanonicalSystem, omega: float, gains: Array, seconds: float) 
     return True
 
 
+@cache
 def capture_row(graph: str) -> Row:
     """Inhibition gain that holds all rotors in C."""
     system = network(graph)
@@ -232,7 +234,8 @@ def contraction_row(graph: str, omega: float = OMEGA) -> Row:
                _stopping_coupling(graph, omega))
 
 
-def tube_row(graph: str, omega: float = OMEGA) -> Row:
+@cache
+def tube_row(graph: str, omega: float) -> Row:
     """The same for tubes from where inhibition sets in, at this cadence."""
     return Row('contraction along tubes' + _slow(omega), graph, f'k [1/s] at omega = {omega:g}',
                _coupling_of_tubes(graph, omega), _stopping_coupling(graph, omega))
@@ -301,6 +304,7 @@ def _stays_together(system: CanonicalSystem, mismatch: float) -> bool:
     return True
 
 
+@cache
 def vote_row(graph: str) -> Row:
     """Weight with which two votes stop the gait, against the equilibrium's own threshold."""
     system = network(graph)

@@ -40,7 +40,7 @@ def test_contraction_costs_what_the_origin_costs(graph: str) -> None:
     ('path', tightness.SLOW_OMEGA), ('ring', tightness.OMEGA)])
 def test_contraction_along_tubes_costs_hardly_more_than_what_works(
         graph: str, omega: float) -> None:
-    found = tightness.tube_row(graph, omega)
+    found = tightness.tube_row(graph, omega=omega)
     assert 0.985 * found.works <= found.certified and found.ratio <= 1.15
 
 
