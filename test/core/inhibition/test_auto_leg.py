@@ -68,8 +68,8 @@ def stopped(loop: Oscillators) -> tuple[float, float]:
 
 
 @given(gait=st.sampled_from(list(GAITS)), graph=st.sampled_from(GRAPHS),
-       speed=st.floats(0.0, 1.5), seconds=st.floats(1.0, 2.5))
-@settings(max_examples=25)
+       speed=st.floats(0.0, 1.5), seconds=st.floats(1.0, 1.8))
+@settings(max_examples=15)
 def test_auto_is_never_later_than_the_leg_that_is_named(
         gait: str, graph: str, speed: float, seconds: float) -> None:
     first = (oscillators(coupling_graph=graph).parameters.canonical.first_leg)
@@ -115,7 +115,7 @@ def test_legs_that_cannot_hold_the_others_are_not_taken(graph: str, able: tuple[
 
 @given(waits=st.lists(st.floats(0.004, 0.6), min_size=2, max_size=6),
        gait=st.sampled_from(list(GAITS)), braking=st.sampled_from([0.0, 0.5, 3.0, 20.0]))
-@settings(max_examples=12)
+@settings(max_examples=8)
 def test_stops_within_starts_and_changes_of_gait_are_kept(
         waits: list[float], gait: str, braking: float) -> None:
     loop = walking(oscillators(braking=braking), 0.4, 1.5)
