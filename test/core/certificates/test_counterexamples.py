@@ -90,7 +90,7 @@ def test_a_gain_for_the_accepted_cadence_waits_for_the_acting_one(values: dict[s
 def test_a_stop_while_the_cadence_moves_is_predicted_to_the_tick(first: float, then: float,
                                                                  wait: float) -> None:
     walk = Walk(cadence_scale=first)
-    walk.walk(0.6, 3.0)
+    walk.walk(0.6, 1.5)
     assert accepted(walk, cadence_scale=then)
     walk.run(wait)
     _, predicted, measured = walk.stop()
@@ -117,7 +117,7 @@ def test_no_leg_takes_a_stride_when_the_inhibited_leg_changes_at_rest(gain: floa
     walk.run(1.0)
     walk.turned[:] = 0.0
     told = walk.loop.change({'inhibited_legs': (leg,)})
-    walk.run(3.0)
+    walk.run(1.5)                                            # a turn takes half of it
     assert walk.loop.stop.state == 'at_rest'
     assert np.abs(walk.turned).max() < np.radians(50.0)      # atan(omega/k), not a turn
     assert not told or f'{leg} rests' in told
@@ -134,7 +134,7 @@ def test_no_leg_takes_a_stride_when_the_coupling_changes_at_rest(gain: float) ->
     walk.run(1.0)
     walk.turned[:] = 0.0
     walk.loop.change({'coupling_gain': gain})
-    walk.run(3.0)
+    walk.run(1.5)
     assert walk.loop.stop.state == 'at_rest' and np.abs(walk.turned).max() < np.radians(50.0)
 
 
