@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from core_examples import GAITS, GRAVITY, TICK, suite_parameters
+from core_examples import GAITS, GRAVITY, suite_parameters
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, ParameterError
@@ -23,13 +23,17 @@ from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 
 HOLD_NS = 200_000_000
 
+TICK = 0.01
+"""Tick of those whose rate does not matter [s]."""
+
 
 class Life:
     """A robot and its loop, with what they went through."""
 
     def __init__(self, start_pose: str = 'standing', start_mode: str = '', seed: int = 0,
-                 push_recovery: bool = True) -> None:
-        self.robot = MujocoRobot(start_pose=start_pose, seed=seed)
+                 push_recovery: bool = True, tick: float = TICK) -> None:
+        self.tick = tick
+        self.robot = MujocoRobot(tick_ns=round(1e9 * tick), start_pose=start_pose, seed=seed)
         parameters = suite_parameters(
             mode=ModeParameters(start_mode=start_mode or start_pose),
             inhibition=InhibitionParameters(push_recovery=push_recovery))
@@ -38,7 +42,7 @@ class Life:
         self.modes: list[str] = []
 
     def go(self, seconds: float, until: str = '') -> Life:
-        for _ in range(round(seconds / TICK)):
+        for _ in range(round(seconds / self.tick)):
             tick = self.loop.tick(self.states[-1])
             self.states.append(self.robot.step(tick.targets))
             if self.modes[-1:] != [tick.mode.mode]:
@@ -104,7 +108,8 @@ def test_changing_its_mind_half_way_up() -> None:
 
 
 def test_pushed_over_it_is_damped_until_it_is_told_to_recover() -> None:
-    life = Life(push_recovery=False).go(0.3)  # on its feet it would fall otherwise, and later
+    # on its feet it would fall otherwise, and later
+    life = Life(push_recovery=False, tick=0.004).go(0.3)
     life.robot.apply_push(np.array((0.0, 400.0, 0.0)), 200_000_000)
     life.go(2.0)
     assert life.modes == ['standing', 'damped']
