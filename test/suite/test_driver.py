@@ -21,7 +21,7 @@ import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist
 from low_level import LowLevel
-from ros_processes import Processes, Ros
+from ros_processes import SHARED_HZ, Processes, Ros
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
@@ -33,7 +33,7 @@ from dmp_cpg_ros.suite_table import DRIVER, ROBOT, WALKING, WALKING_NODES
 processes, ros, ros_domain = (
     ros_processes.processes, ros_processes.ros, ros_processes.ros_domain)
 
-TICK_NS = 4_000_000
+TICK_NS = round(1e9 / SHARED_HZ)
 
 
 class Session:
@@ -46,12 +46,14 @@ class Session:
         expected = [kind.name for kind in WALKING if kind.name != ROBOT]
         file = folder / 'my_suite.yaml'
         file.write_text(yaml.safe_dump({'/**': {'ros__parameters': {
-            'expected_nodes': expected, 'start_mode': 'lying', 'gait': 'amble'}}, **own}),
+            'expected_nodes': expected, 'start_mode': 'lying', 'gait': 'amble',
+            'control_rate': SHARED_HZ}}, **own}),
             encoding='utf-8')
         self.suite = processes.executable(
             'composed_suite', *(name for name in WALKING_NODES if name != ROBOT),
             '--ros-args', '--params-file', str(file))
-        self.driver = processes.node(DRIVER, command_interfaces=list(interfaces))
+        self.driver = processes.node(DRIVER, command_interfaces=list(interfaces),
+                                     control_rate=SHARED_HZ)
         self.ros, self.robot = ros, LowLevel(ros, interfaces)
         self.answered = {leg: -1 for leg in LEGS}
         self.heard: dict[str, str] = {}
