@@ -35,7 +35,7 @@ events:
 TOO_EARLY = """\
 name: too_early
 duration: 1.0
-parameters: {start_mode: lying, start_pose: lying}
+parameters: {start_mode: lying, start_pose: lying, control_rate: 100.0}
 events:
   - {at: 0.1, inhibit: false}
 """
