@@ -29,7 +29,7 @@ pytestmark = pytest.mark.skipif(
 SETTLED_NS = 1_000_000_000
 """Time on the robot's clock without a change after which it has done what it was told [ns]."""
 
-AT_USUAL_RATE = ('README.md', 'usage.md')
+AT_USUAL_RATE = ('README.md',)
 """Documents that show numbers which depend on the control rate; the walks of all others are
 typed with the option of another one: the machine has less to do.
 """
