@@ -23,6 +23,7 @@ from dmp_cpg_ros.suite import load_gaits, load_suite
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies import late_walks
 from dmp_cpg_ros.studies.late_walks import Stalls, late, starved
 
 TICK_NS = 4_000_000
@@ -134,7 +135,9 @@ def test_moving_legs_that_are_late_without_a_rhythm_are_held_and_then_left(
 
 
 @pytest.mark.parametrize(('gait', 'speed'), [('amble', 0.5), ('trot', 1.0)])
-def test_a_robot_whose_controllers_starve_does_not_fall(gait: str, speed: float) -> None:
+def test_a_robot_whose_controllers_starve_does_not_fall(
+        gait: str, speed: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(late_walks, 'STARVED_S', 9.0)  # in which it stands by itself, too
     outcome = starved(gait, speed, Stalls(150.0, 200.0), seed=1)
     assert not outcome.fell and outcome.stood
 
@@ -224,7 +227,9 @@ def test_a_robot_whose_targets_come_in_bursts_walks_as_fast_as_it_should(gait: s
 @pytest.mark.parametrize(('gait', 'speed', 'delay_ms', 'lead_ms'), [
     ('trot', 2.0, (24.0, 24.0), 24), ('amble', 1.2, (5.0, 30.0), 32)])
 def test_with_a_lead_a_robot_whose_targets_come_late_walks_as_fast_as_it_should_at_speed(
-        gait: str, speed: float, delay_ms: tuple[float, float], lead_ms: int) -> None:
+        gait: str, speed: float, delay_ms: tuple[float, float], lead_ms: int,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(late_walks, 'LATE_S', 3.0)
     leads, late_only = (late(gait, speed, delay_ms, lead, seed=1) for lead in (lead_ms, 0))
     assert not leads.fell and leads.reached == pytest.approx(speed, rel=0.02) and leads.tilt < 2.0
     assert late_only.fell or late_only.reached < 0.9 * speed
