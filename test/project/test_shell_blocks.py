@@ -186,10 +186,10 @@ class Reader:
         return [*light, *(['--composed'] if words and not SPREAD & set(words) else [])]
 
     def make(self, words: list[str]) -> None:
-        """Run what ``make`` would run, in the reader's folder, in one process."""
+        """Run what ``make`` would run, in the reader's folder, in one process; as LIGHT says."""
         assert words == ['demo'], words
         process = self.processes.start(
-            'bash', '-c', f'cd {self.folder}; {recipe(*words)} --composed')
+            'bash', '-c', f'cd {self.folder}; {recipe(*words)} --composed --rate {SHARED_HZ}')
         assert process.wait(PATIENCE_S) == 0, process
         assert (self.folder / 'runs' / 'latest' / 'report.html').is_file(), process
 
