@@ -128,19 +128,20 @@ def test_joint_targets(leg: str, values: np.ndarray) -> None:
 
 
 @given(numbers(12), numbers(4, 3), numbers(4, 2), numbers(3), numbers(12), numbers(4), numbers(4),
-       numbers(3), st.tuples(*[st.booleans()] * 4))
+       numbers(4), st.tuples(*[st.booleans()] * 4), numbers(4))
 def test_posture_feedback(torque: np.ndarray, shift: np.ndarray, drift: np.ndarray,
                           correction: np.ndarray, measured: np.ndarray,
                           force: np.ndarray, margins: np.ndarray, way: np.ndarray,
-                          felt: tuple[bool, ...]) -> None:
+                          felt: tuple[bool, ...], level: np.ndarray) -> None:
     command = BodyCommand('rising', 'rise', 1.0 / 3.0, -0.1)
     sent = PostureFeedback(torque, shift, drift, correction, command, measured, force,
-                           tuple(margins.tolist()), Progress((way[0], way[1]), way[2]), felt)
+                           tuple(margins.tolist()), Progress((way[0], way[1]), way[2], way[3]),
+                           felt, tuple(level.tolist()))
     message = wire(PostureFeedbackWriter().fill(0, sent))
     read = PostureFeedbackReader().read(message)
     assert bits(read.torque, read.shift_in_base, read.drift_in_base, read.correction,
-                read.measured, read.foot_force) == bits(
-                    torque, shift, drift, correction, measured, force)
+                read.measured, read.foot_force, read.level) == bits(
+                    torque, shift, drift, correction, measured, force, level)
     assert read.command == command == CommandReader().read(message)
     assert (read.margins, read.progress, read.felt) == (sent.margins, sent.progress, felt)
     assert BodyReader().read(message) == ('rising', sent.margins, sent.progress)

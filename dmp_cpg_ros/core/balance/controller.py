@@ -25,11 +25,12 @@ from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, 
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.balance.progress import feet_behind
+from dmp_cpg_ros.core.balance.terrain import LEVEL_FEET, ROLLING, SLOW, Terrain
 from dmp_cpg_ros.core.balance.unfelt import as_planned
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
-from dmp_cpg_ros.core.gait.contact_feedback import believed
+from dmp_cpg_ros.core.gait.contact_feedback import LOADED, believed, quarter_weight
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.blocked import Progress
 from dmp_cpg_ros.core.maths import Array, vec3
@@ -42,6 +43,8 @@ from dmp_cpg_ros.core.transformation.foot_path import activities_step
 from dmp_cpg_ros.core.transformation.leg import LegFeedback, body_scale, nominal_foothold
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
+
+LEFT, UP = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 LARGEST_LOAD = 2.0
 """Largest normal force of a fully loaded foot, in weights of the robot."""
@@ -77,7 +80,9 @@ class PostureFeedback:
     margins : tuple of float
         Of the capture point to the edges of the support polygon [m]; ``WIDE`` while nobody asks.
     progress : Progress or None
-        Whether the body comes ahead, where it balances.
+        Whether the body comes ahead, where it balances, and how rough its ground is.
+    level : tuple of 4 float
+        How far over the plane that the body follows the feet are to stand [m].
     """
 
     torque: Array
@@ -90,12 +95,14 @@ class PostureFeedback:
     margins: tuple[float, ...] = WIDE
     progress: Progress | None = None
     felt: tuple[bool, ...] = FELT
+    level: tuple[float, ...] = LEVEL_FEET
 
     def of_leg(self, i: int) -> LegFeedback:
         """What the path of leg ``i`` takes of it."""
         return LegFeedback(
             self.measured[3 * i : 3 * i + 3], self.shift_in_base[i], self.drift_in_base[i],
-            self.correction, float(self.foot_force[i]))
+            self.correction, float(self.foot_force[i]),
+            self.level[i], self.progress.rough if self.progress else 0.0)
 
 
 class PostureState(NamedTuple):
@@ -111,12 +118,15 @@ class PostureState(NamedTuple):
         What the reference has the body do.
     offset : MassOffset
         Where the centre of mass is found to be.
+    terrain : Terrain
+        What the feet have felt of the ground.
     """
 
     activity: Array
     integral: VelocityCorrection = VelocityCorrection()
     plan: MotionPlan = MotionPlan()
     offset: MassOffset = MassOffset()
+    terrain: Terrain = Terrain()
 
 
 class PostureController:
@@ -148,6 +158,7 @@ class PostureController:
             vec3.triple(foot) for foot in (footholds - description.com_in_base).tolist()]
         self._room = self.placement.room(parameters.reach)
         self.foot_radius = float(np.mean([leg.foot_radius for leg in description.legs]))
+        self._touch_force = LOADED * quarter_weight(description)
         self._com_in_base = vec3.triple(description.com_in_base.tolist())
         self._torque_limit = np.concatenate([leg.torque_limit for leg in description.legs])
         inertia = description.base_inertia.diagonal()
@@ -233,7 +244,12 @@ class PostureController:
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(gait, positions, duty, omega, moving)
         acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
-        return PostureState(activity, integral, plan, offset), PostureFeedback(
+        terrain, level = self._ground(
+            memory.terrain, state, [foot for foot, _ in legs],
+            [position / (1.0 - duty) + 0.5 for position in positions],
+            self.scale.foot_speed(*reference, gait.apart)
+            < SLOW * self.scale.speed(gait.highest(self.scale)))
+        return PostureState(activity, integral, plan, offset, terrain), PostureFeedback(
             self._torque(body, legs, feet, load, planned, bounce, acceleration),
             np.array([part for (x, y), up in zip(shift, raised, strict=True)
                       for part in (x, y, up)]).reshape(-1, 3),
@@ -245,8 +261,22 @@ class PostureController:
                 measured[0] - (planned[0] - lasting[0]),
                 measured[1] - (planned[1] - lasting[1]))),
             Progress((measured[0], measured[1]), feet_behind(
-                plan.expected, beside, feet, self._footholds, positions, duty, omega)),
-            felt or FELT)
+                plan.expected, beside, feet, self._footholds, positions, duty, omega),
+                terrain.rough), felt or FELT, level)
+
+    def _ground(self, terrain: Terrain, state: RobotState, feet_in_base: Sequence[Triple],
+                swung: Sequence[float], slow: bool) -> tuple[Terrain, tuple[float, ...]]:
+        """Memory of the ground, and heights of the feet over its plane."""
+        R_world_base = vec3.rotation(state.base_quaternion.tolist())
+        place = vec3.triple(state.base_position_in_world.tolist())
+        normal = state.ground_normal_in_world
+        n = UP if normal is None else vec3.triple(normal.tolist())
+        return terrain.felt(
+            place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot in feet_in_base],
+            n, swung,
+            [force > self._touch_force for force in believed(state.foot_force).tolist()],
+            self.scale.leg_length,
+            slow and abs(vec3.dot(n, vec3.times(R_world_base, LEFT))) < ROLLING)
 
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], swings: list[float],
                  under: Pair, error: Pair) -> tuple[float, ...]:

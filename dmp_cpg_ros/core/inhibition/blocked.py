@@ -76,10 +76,13 @@ class Progress(NamedTuple):
     behind : float
         How far the feet that lead the way stand behind where the gait has them [m]; negative
         where they are ahead of it, 0 where none of them stands.
+    rough : float
+        Height of what its feet are to be lifted over [m]; 0 on even ground.
     """
 
     velocity: Pair = (0.0, 0.0)
     behind: float = 0.0
+    rough: float = 0.0
 
 
 class BlockState(NamedTuple):

@@ -35,6 +35,11 @@ bear, and twice that.
 LEAST = 0.1
 """Least share: with none a robot that is held, or wrong about its speed, would not move again."""
 
+CLIMBING = 0.8
+"""Least share on ground that is known to be rough: on steps the feet stand where the ground lets
+them, the margins are small by that, and a body that does not go on falls back from them.
+"""
+
 NARROW = 0.5
 """q of a gait that stands on one side only."""
 
@@ -60,14 +65,15 @@ def room(margins: Sequence[float] | None, leg_length: float, wide: float) -> flo
     return min(margins) / (q * leg_length)
 
 
-def followed_share(share: float, left: float | None, dt: float, most: float = 1.0) -> float:
+def followed_share(share: float, left: float | None, dt: float, most: float = 1.0,
+                   least: float = LEAST) -> float:
     """Share of the command after a tick of dt [s], in [LEAST, 1], from the one before,
-    :func:`room`, and the most that may be followed.
+    :func:`room`, and the most that may be followed and least that it leaves.
     """
     regained = min(most, share + REGAIN * dt)
     if left is None:
         return regained
-    return min(regained, max(LEAST, (left - DISTURBED) / (EASY - DISTURBED)))
+    return min(regained, max(least, (left - DISTURBED) / (EASY - DISTURBED)))
 
 
 def changing_share(network: GaitNetwork, wanted: Gait, command: tuple[float, float, float]

@@ -28,7 +28,13 @@ from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.blocked import NO_BLOCK, Progress, block_step
-from dmp_cpg_ros.core.inhibition.caution import changing_share, followed_share, room
+from dmp_cpg_ros.core.inhibition.caution import (
+    CLIMBING,
+    LEAST,
+    changing_share,
+    followed_share,
+    room,
+)
 from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, push_step
 from dmp_cpg_ros.core.inhibition.step_timing import quickened
@@ -164,25 +170,29 @@ class GaitSupervisor:
         state = self._blocked(state, r, command, progress, network, body_mode, dt)
         state = self._voted(state, tally or state.tally, network)
         state = self._pushed(state, network, x, margins, body_mode)
+        rough = progress is not None and progress.rough > 0.0
         most = 1.0 if wanted is None else changing_share(network, wanted, command)
-        quick, state = state.quickness > 1.0, self._balancing(state, margins, network, most, dt)
+        quick = state.quickness > 1.0
+        state = self._balancing(state, margins, network, rough, most, dt)
         if state.requested:
             return (replace_unchecked(state, armed=False, state='waiting') if quick
                     else self._stopping(state, network, x, rates, speed))
         return self._running(state, network.phase_errors(x), speed)
 
     def _balancing(self, state: SupervisorState, margins: Sequence[float] | None,
-                   network: GaitNetwork, most: float, dt: float) -> SupervisorState:
+                   network: GaitNetwork, rough: bool, most: float, dt: float) -> SupervisorState:
         """Follow less of the command, and step faster, while the body is disturbed; follow at most
-        a share of it while the gait changes.
+        a share of it while the gait changes. On rough ground feet need their time to be lifted
+        over it.
         """
         p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.wide)
         predicted = state.requested or state.state == 'releasing'
         share = 1.0
         if not (predicted or state.push.acts):
-            share = (followed_share(state.share, left, dt, min(most, state.block.most))
+            share = (followed_share(state.share, left, dt, min(most, state.block.most),
+                                    CLIMBING if rough else LEAST)
                      if p.caution else followed_share(state.share, None, dt, most))
-        free = p.step_timing and (state.push.acts or not predicted)
+        free = p.step_timing and (state.push.acts or not predicted) and not rough
         quickness = quickened(state.quickness, left if free else None, dt)
         same = (share, quickness) == (state.share, state.quickness)
         return state if same else replace_unchecked(state, share=share, quickness=quickness)

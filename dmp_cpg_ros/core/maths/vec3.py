@@ -106,3 +106,16 @@ def heading_frame(z_in_base: Triple) -> Matrix:
     length = sqrt(forward_x * forward_x + forward_y * forward_y + forward_z * forward_z) + 1e-12
     forward = (forward_x / length, forward_y / length, forward_z / length)
     return forward, cross(z_in_base, forward), z_in_base
+
+
+def damped_solution(J: Matrix, velocity: Triple) -> Triple:
+    """Solve J q̇ = v by Cramer's rule; damped near singular matrices."""
+    (a, b, c), (d, e, f), (g, h, i) = J
+    x, y, z = velocity
+    minor_0, minor_1, minor_2 = e * i - f * h, f * g - d * i, d * h - e * g
+    determinant = a * minor_0 + b * minor_1 + c * minor_2
+    inverse = determinant / (determinant * determinant + 1e-12)
+    return (
+        (x * minor_0 + b * (f * z - y * i) + c * (y * h - e * z)) * inverse,
+        (a * (y * i - f * z) + x * minor_1 + c * (d * z - y * g)) * inverse,
+        (a * (e * z - y * h) + b * (y * g - d * z) + x * minor_2) * inverse)

@@ -19,7 +19,7 @@ from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.contact_feedback import LOADED, quarter_weight
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, minus, moved, pair, plus, triple
+from dmp_cpg_ros.core.maths.vec3 import Triple, damped_solution, minus, moved, pair, plus, triple
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -35,7 +35,7 @@ from dmp_cpg_ros.core.transformation.foot_path import (
     rolling_share,
     swing_height,
 )
-from dmp_cpg_ros.core.transformation.stumble import OffsetRates
+from dmp_cpg_ros.core.transformation.foothold_offset import OffsetRates
 
 
 @dataclass(frozen=True)
@@ -119,6 +119,10 @@ class LegFeedback(NamedTuple):
         Added to the reference for the stance velocity, not the cadence [m/s], [m/s], [rad/s].
     foot_force : float
         Measured normal force of the foot [N]; 0 without a contact sensor.
+    level : float
+        How far over the plane that the body follows the foot is to stand [m].
+    rough : float
+        Height of what the feet are to be lifted over [m]; 0 on even ground.
     """
 
     joint_position: Array
@@ -126,6 +130,8 @@ class LegFeedback(NamedTuple):
     drift_in_base: Array
     correction: Array
     foot_force: float = 0.0
+    level: float = 0.0
+    rough: float = 0.0
 
 
 class LegPrimitive:
@@ -230,16 +236,17 @@ class LegPrimitive:
         goal = self.kinematics.angles(
             (p_x, p_y, p_z + (stumble.height - activity * bounce.height)))
         _, jacobian = self.kinematics.foot_and_jacobian(goal)
-        goal_velocity = _joint_velocity(jacobian, (
+        goal_velocity = damped_solution(jacobian, (
             v_x, v_y, v_z + stumble.rate - activity * bounce.velocity * (rate / omega)))
         joints = self.transformation.follow(state.joints, goal, goal_velocity, dt)
         return LegState(joints, activity, offset, stumble, motion, sent), goal, goal_velocity
 
     def path(self, reference: Triple, omega: float, duty: float, activity: float,
              stumble: reflex.Stumble, feedback: LegFeedback) -> FootPath:
-        """Path of the foot for the corrected reference, higher after a stumble."""
+        """Path of the foot for the corrected reference, higher over what was felt."""
         v_x, v_y, gamma = plus(reference, triple(feedback.correction.tolist()))
-        clearance = self.clearance + self.stumble_lift * stumble.lifts
+        clearance = reflex.swing_clearance(
+            self.clearance, self.stumble_lift, stumble, feedback.rough, self.scale.leg_length)
         return FootPath(
             self._foothold, v_x, v_y, gamma, omega, duty, activity * clearance, self.rolling)
 
@@ -262,11 +269,13 @@ class LegPrimitive:
             progress = reflex.swing_progress(
                 path, path.swung(positions[0]), measured, target, touches)
         stumble = reflex.stumble_step(
-            state.stumble, progress, lift if stands else activity * lift, lag, dt)
+            state.stumble, progress, lift if stands else activity * lift, lag, dt,
+            feedback.rough > 0.0)
         if will_stand:
             drift = pair(feedback.drift_in_base.tolist())
             slipped = away[:2] if stands else (0.0, 0.0)
-            return self.offset_rates.in_stance(offset, drift, slipped, activity, dt), stumble
+            return self.offset_rates.in_stance(
+                offset, drift, slipped, activity, dt, feedback.level), stumble
         placement = triple(feedback.shift_in_base.tolist())
         height, _ = swing_height(path.swung(positions[1]))
         rate = self.offset_rates.in_swing(offset, placement, height, activity, dt)
@@ -331,16 +340,3 @@ def nominal_foothold(description: RobotDescription, leg: str) -> Array:
     x = geometry.hip_in_base[0] + geometry.hip_offset[0] + description.com_in_base[0]
     y = geometry.hip_in_base[1] + kinematics.lateral_offset
     return np.array((x, y, geometry.foot_radius - description.stance_height))
-
-
-def _joint_velocity(J: Matrix, velocity: Triple) -> Triple:
-    """Solve J q̇ = v by Cramer's rule; damped near singular postures."""
-    (a, b, c), (d, e, f), (g, h, i) = J
-    x, y, z = velocity
-    minor_0, minor_1, minor_2 = e * i - f * h, f * g - d * i, d * h - e * g
-    determinant = a * minor_0 + b * minor_1 + c * minor_2
-    inverse = determinant / (determinant * determinant + 1e-12)
-    return (
-        (x * minor_0 + b * (f * z - y * i) + c * (y * h - e * z)) * inverse,
-        (a * (y * i - f * z) + x * minor_1 + c * (d * z - y * g)) * inverse,
-        (a * (e * z - y * h) + b * (y * g - d * z) + x * minor_2) * inverse)

@@ -1,8 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What moves the path of a foot: the stumbling reflex, and the foothold offset.
-
-A swinging foot that is held up by an obstacle is lifted over it.
+"""The stumbling reflex: a swinging foot that is held up by an obstacle is lifted over it.
 
 Cats lift a paw higher when its back touches something while it swings (Forssberg 1979); with
 oscillators as here it took robots over steps blind (Focchi et al. 2013; Ajallooeian et al. 2013).
@@ -22,92 +20,15 @@ lifts.
 A foot that comes down on something high stands still as well, above its target. It yields, too,
 and its path comes back to the height of the others over the stance, so that it does not throw the
 body up.
-
-The foothold offset is the shift s of a foot's path. In swing ṡ = h λ_p (s_wanted − s), with h the
-relative height of the foot: a foot that has not left the ground is not dragged along it.
-
-In stance ṡ = drift + λ_y (p_measured − p) horizontally, a spring that yields: the target p of a
-standing foot stays where the foot is. Vertically ṡ = −λ_l s, back to level.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import exp, hypot, pi
 from typing import NamedTuple
 
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.transformation.foot_path import LOWERING, FootPath
-
-
-@dataclass(frozen=True)
-class OffsetRates:
-    """Rates of the offset.
-
-    Attributes
-    ----------
-    placement : float
-        λ_p [1/s].
-    yielding : float
-        λ_y [1/s].
-    levelling : float
-        λ_l [1/s].
-    """
-
-    placement: float
-    yielding: float
-    levelling: float
-
-    def in_swing(self, shift: Triple, wanted: Triple, height: float, activity: float,
-                 dt: float) -> Triple:
-        """Rate of the shift of a swinging foot.
-
-        Parameters
-        ----------
-        shift, wanted : tuple of float
-            Present and wanted shift [m].
-        height : float
-            Height of the foot as a share of its largest, in [0, 1].
-        activity : float
-            Swing activity of the leg; a foot that comes down as the phase stops is left alone.
-        dt : float
-            Time step [s], positive.
-
-        Returns
-        -------
-        tuple of float
-            Mean over the step [m/s].
-        """
-        share = (1.0 - exp(-self.placement * activity * height * dt)) / dt
-        (x, y, z), (wanted_x, wanted_y, wanted_z) = shift, wanted
-        return (wanted_x - x) * share, (wanted_y - y) * share, (wanted_z - z) * share
-
-    def in_stance(self, shift: Triple, drift: tuple[float, float], away: tuple[float, float],
-                  activity: float, dt: float) -> Triple:
-        """Rate of the shift of a standing foot.
-
-        Parameters
-        ----------
-        shift : tuple of float
-            Present shift [m].
-        drift : tuple of float
-            Horizontal velocity by which the ground moves otherwise than planned [m/s].
-        away : tuple of float
-            Where the foot is horizontally relative to its target [m].
-        activity : float
-            Swing activity of the leg; at rest the foot holds.
-        dt : float
-            Time step [s], positive.
-
-        Returns
-        -------
-        tuple of float
-            Mean over the step [m/s].
-        """
-        share = activity * (1.0 - exp(-self.yielding * dt)) / dt
-        back = (1.0 - exp(-self.levelling * dt)) / dt
-        return drift[0] + share * away[0], drift[1] + share * away[1], -back * shift[2]
-
 
 FEELING = (0.3, 0.85)
 """Shares of the swing between which the foot feels what holds it up."""
@@ -155,6 +76,12 @@ POST_STUMBLE_SWINGS = 2
 
 HIGHEST = 2
 """Additional heights by which a foot steps higher that trips again and again."""
+
+CLEARING = 0.15
+"""By how much a swing is higher than what is known to be in the way, in lengths of the leg."""
+
+HIGHEST_SWING = 0.55
+"""Height of the highest swing over rough ground, in lengths of the leg."""
 
 
 class SwingProgress(NamedTuple):
@@ -255,7 +182,7 @@ class Stumble(NamedTuple):
 
 
 def stumble_step(before: Stumble, progress: SwingProgress | None, lift: float, threshold: float,
-                 dt: float) -> Stumble:
+                 dt: float, rough: bool = False) -> Stumble:
     """Advance the reflex of one foot.
 
     Parameters
@@ -270,6 +197,9 @@ def stumble_step(before: Stumble, progress: SwingProgress | None, lift: float, t
         Distance from its target at which a foot that stands still has tripped or landed [m].
     dt : float
         Time since the last tick [s].
+    rough : bool
+        Whether the ground is known to be uneven: a foot that touches something in the second half
+        of its swing, and is not held up on its way, has then landed.
 
     Returns
     -------
@@ -294,10 +224,13 @@ def stumble_step(before: Stumble, progress: SwingProgress | None, lift: float, t
         and speed < STANDSTILL * progress.swing_speed
         and progress.target_place - progress.place > max(
             threshold + late * max(0.0, progress.target_place - last.target_place), 2.0 * above))
-    landed = before.landed or (
+    came_down = (
         progress.swung > (TOUCHED if progress.touches else TOUCHING)
         and sinking < SETTLED * progress.sinking_speed
-        and above > threshold + late * max(0.0, last.target_level - progress.target_level))
+        and above > threshold + late * max(0.0, last.target_level - progress.target_level)) or (
+        rough and progress.touches and progress.swung > (HIGH if tripped else TOUCHED))
+    held_up = rough and progress.target_place - progress.place > threshold
+    landed = before.landed or (came_down and not held_up)
     height, up = before.height, before.up or before.height >= RISEN * lift
     if tripped and not landed and (not up or progress.swung < HIGH):
         height = lift + (height - lift) * exp(-QUICKNESS * dt)
@@ -340,3 +273,25 @@ def compliant_offset_rate(stumble: Stumble, offset_rate: Triple, velocity: Tripl
         return offset_rate
     x, y, z = (COMPLIANCE * a - v for a, v in zip(away, velocity, strict=True))
     return x, y, z if stumble.landed else offset_rate[2]
+
+
+def swing_clearance(clearance: float, lift: float, stumble: Stumble, rough: float,
+                    leg_length: float) -> float:
+    """Height of a swing [m].
+
+    Parameters
+    ----------
+    clearance, lift : float
+        Height on even ground, and what a foot that has tripped adds to it [m].
+    stumble : Stumble
+        What the reflex does.
+    rough : float
+        Height of what is known to be in the way of all feet [m]; 0 on even ground.
+    leg_length : float
+        l [m].
+    """
+    higher = clearance + lift * stumble.lifts
+    if not rough:
+        return higher
+    return max(clearance, min(
+        max(higher, rough + CLEARING * leg_length), HIGHEST_SWING * leg_length))

@@ -23,7 +23,8 @@ _BASE = slice(_FEET.stop, _FEET.stop + len(layouts.CORRECTION_ROWS))
 _MARGINS = slice(_BASE.stop, _BASE.stop + len(layouts.MARGIN_ROWS))
 _PROGRESS = slice(_MARGINS.stop, _MARGINS.stop + len(layouts.PROGRESS_ROWS))
 _FELT = slice(_PROGRESS.stop, _PROGRESS.stop + len(layouts.FELT_ROWS))
-_COMMAND = slice(_FELT.stop, None)
+_GROUND = slice(_FELT.stop, _FELT.stop + len(layouts.GROUND_ROWS))
+_COMMAND = slice(_GROUND.stop, None)
 
 
 class PostureFeedbackWriter:
@@ -43,9 +44,10 @@ class PostureFeedbackWriter:
         self._velocity[_FEET].reshape(len(LEGS), 3)[:, :2] = feedback.drift_in_base
         self._velocity[_BASE] = feedback.correction
         self._position[_MARGINS] = feedback.margins
-        velocity, behind = feedback.progress or Progress()
-        self._position[_PROGRESS] = (*velocity, behind)
+        velocity, behind, rough = feedback.progress or Progress()
+        self._position[_PROGRESS] = (*velocity, behind, rough)
         self._position[_FELT] = feedback.felt
+        self._position[_GROUND] = feedback.level
         self._effort[_JOINTS] = feedback.torque
         self._effort[_FEET].reshape(len(LEGS), 3)[:, 2] = feedback.foot_force
         self._position[_COMMAND], self._velocity[_COMMAND] = layouts.command_rows(feedback.command)
@@ -68,12 +70,13 @@ class PostureFeedbackReader:
             self._command.of(position[_COMMAND], velocity[_COMMAND]), position[_JOINTS],
             effort[_FEET].reshape(len(LEGS), 3)[:, 2], tuple(position[_MARGINS].tolist()),
             _progress(position[_PROGRESS]), tuple(
-                felt > 0.0 for felt in position[_FELT].tolist()))
+                felt > 0.0 for felt in position[_FELT].tolist()),
+            tuple(position[_GROUND].tolist()))
 
 
 def _progress(row: Array) -> Progress:
-    x, y, behind = row.tolist()
-    return Progress((x, y), behind)
+    x, y, behind, rough = row.tolist()
+    return Progress((x, y), behind, rough)
 
 
 class CommandReader:

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.canonical.phase import phase_generator, state_at
+from dmp_cpg_ros.core.transformation.foothold_offset import OffsetRates
 from dmp_cpg_ros.core.transformation.leg import LegFeedback, LegParameters, LegPrimitive
-from dmp_cpg_ros.core.transformation.stumble import OffsetRates
 
 RATES = OffsetRates(40.0, 20.0, 10.0)
 lengths = st.floats(-0.3, 0.3)

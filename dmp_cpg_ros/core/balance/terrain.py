@@ -1,0 +1,160 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Memory of how rough the ground is, which all legs share.
+
+A leg that feels alone learns of every step by tripping over it, and it stands on a step as if that
+were level: it goes back to the height of the others and throws the body to its side. What one foot
+has felt here serves all (Focchi et al. 2018 keep a step's height for the hind legs; Bledt et al.
+2018 and Kim et al. 2019 let a body climb stairs blind along a plane through its footholds).
+
+**Level.** With p_i the newest foothold of each leg and n the normal of the plane that the body
+follows, foot i stands
+
+    e_i = n · p_i − mean_j n · p_j
+
+over that plane, and is left there: its path has its stance at e_i − ``RAISED`` ρ instead of 0.
+A foot that is to stand and touches nothing goes on down, by ``SEARCHED`` l.
+
+**Rough.** ρ is the height of what the feet are to be lifted over. It is 0 until one foothold is
+higher than the median of all by more than ``STEP`` l, l the length of the leg, under a body that
+does not roll, for after a push it feels steps where there are none, and that walks at less than
+``SLOW`` of its gait's highest speed: near that the footholds of a walk and a bound differ as much
+on even ground. A lower one tells nothing: the foot may as well hang in a gap, and to look for the
+ground there, or to count on it, overturns the robot. From there on ρ grows to
+
+- max e − min e, where this is more than ``UNEVEN`` l: feet stand on steps, up or down;
+- h + ``MARGIN`` l for a foot that touches something in the middle of its swing, at h over the mean
+  of the footholds: something is there, and is higher;
+
+up to ``HIGHEST`` l, and fades by e^(−s/(``FADES`` l)) on a way s. On flat ground no foothold is
+that high, ρ is 0 and so are all e_i.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import dist, exp
+from typing import NamedTuple
+
+from dmp_cpg_ros.core.maths.vec3 import Triple, dot
+
+UNEVEN = 0.1
+"""Difference between the heights of footholds that even ground does not feign, in lengths of the
+leg: six gaits on the flat have at most half of it.
+"""
+
+STEP = 0.25
+"""By how much a foothold is higher than the median that tells the first step, in lengths of the
+leg; the edge of a gap, into which a foot slips or the body leans, tells less.
+"""
+
+ROLLING = 0.17
+"""Sine of the body's roll to its ground, 10 degrees, up to which it may tell the first step."""
+
+SLOW = 0.5
+"""Share of a gait's highest speed up to which it may, of the reference."""
+
+SCUFFING = (0.25, 0.8)
+"""Shares of the swing between which a foot that touches something has met an obstacle."""
+
+CLEAR_OF_GROUND = 0.06
+"""Height from which that is not the ground that it has just left, in lengths of the leg."""
+
+MARGIN = 0.13
+"""By how much an obstacle is taken to be higher than where it was touched, in lengths of the leg,
+as in the stumbling reflex.
+"""
+
+HIGHEST = 0.6
+"""Largest height that is remembered, in lengths of the leg."""
+
+FADES = 4.0
+"""Way on which the memory fades to 1/e, in lengths of the leg: a few strides."""
+
+FORGOTTEN = 0.05
+"""Height below which nothing is left of it, in lengths of the leg."""
+
+JUMP = 1.0
+"""Way within a tick from which the body's estimated place began anew, in lengths of the leg."""
+
+RAISED = 0.3
+"""By how much of ρ the legs stand longer, so that trunk and knees stay clear of edges."""
+
+SEARCHED = 0.25
+"""How much deeper a foot looks for ground that is not where its stance begins, in lengths of the
+leg; no further than it can reach.
+"""
+
+LEVEL_FEET = (0.0, 0.0, 0.0, 0.0)
+"""Heights of feet that stand in the plane [m]."""
+
+
+class Terrain(NamedTuple):
+    """The memory.
+
+    Attributes
+    ----------
+    rough : float
+        ρ [m]; 0 on even ground.
+    footholds : tuple of (float, float, float)
+        p_i, where each foot stood last [m]; empty before the first tick.
+    place : tuple of float
+        Of the body at the last tick, in the same frame [m].
+    """
+
+    rough: float = 0.0
+    footholds: tuple[Triple, ...] = ()
+    place: Triple = (0.0, 0.0, 0.0)
+
+    def felt(self, place: Triple, feet: Sequence[Triple], normal: Triple,
+             swung: Sequence[float], touches: Sequence[bool], leg_length: float,
+             calm: bool = True) -> tuple[Terrain, tuple[float, ...]]:
+        """Advance by one tick.
+
+        Parameters
+        ----------
+        place : tuple of float
+            Of the body [m].
+        feet : sequence of four tuples of float
+            Measured places in the same frame [m].
+        normal : tuple of float
+            n, of the plane that the body follows.
+        swung : sequence of four floats
+            Share of the swing that has passed; outside of [0, 1] in stance, below 0 in the second
+            half of it.
+        touches : sequence of four bool
+            Whether a foot touches something, as far as its sensor tells.
+        leg_length : float
+            l [m].
+        calm : bool
+            Whether the body may tell the first step.
+
+        Returns
+        -------
+        terrain : Terrain
+        level : tuple of four floats
+            Where the feet are to stand over the plane [m]; 0 while nothing is rough.
+        """
+        way = dist(place, self.place)
+        anew = not self.footholds or way > JUMP * leg_length
+        # a foot that hangs in the air, or whose sensor is silent, counts as standing in the end
+        footholds = tuple(feet) if anew else tuple(
+            now if share < 0.0 or (share > 1.0 and touch) else last
+            for now, last, share, touch in zip(feet, self.footholds, swung, touches, strict=True))
+        heights = [dot(normal, foot) for foot in footholds]
+        mean = sum(heights) / len(heights)
+        low, lower, higher, high = sorted(heights)
+        rough = 0.0 if anew else self.rough * exp(-way / (FADES * leg_length))
+        found = calm and high - 0.5 * (lower + higher) > STEP * leg_length
+        if found or (rough and high - low > UNEVEN * leg_length):
+            rough = max(rough, high - low)
+        for foot, share, touch in zip(feet, swung, touches, strict=True):
+            if rough and touch and SCUFFING[0] < share < SCUFFING[1]:
+                height = dot(normal, foot) - mean
+                if height > CLEAR_OF_GROUND * leg_length:
+                    rough = max(rough, height + MARGIN * leg_length)
+        rough = min(rough, HIGHEST * leg_length) if rough > FORGOTTEN * leg_length else 0.0
+        return Terrain(rough, footholds, place), LEVEL_FEET if rough == 0.0 else tuple(
+            height - mean - RAISED * rough - (
+                SEARCHED * leg_length if share > 1.0 and not touch else 0.0)
+            for height, share, touch in zip(heights, swung, touches, strict=True))

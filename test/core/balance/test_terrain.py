@@ -1,0 +1,131 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the feet have felt of the ground: nothing where it is even, and for a while where not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dmp_cpg_ros.core.balance.terrain import (
+    FADES,
+    FORGOTTEN,
+    HIGHEST,
+    JUMP,
+    LEVEL_FEET,
+    MARGIN,
+    RAISED,
+    SEARCHED,
+    STEP,
+    UNEVEN,
+    Terrain,
+)
+from dmp_cpg_ros.core.maths.vec3 import Triple
+
+LENGTH = 0.28
+NOTHING = Terrain()
+KNOWN = Terrain(0.02, ((0.0, 0.0, 0.0),) * 4, (0.0, 0.0, 0.3))
+UP = (0.0, 0.0, 1.0)
+STANDING, SWINGING = -0.2, 0.5
+PLACES = ((0.2, 0.1), (0.2, -0.1), (-0.2, 0.1), (-0.2, -0.1))
+
+heights = st.lists(st.floats(-0.5, 0.5), min_size=4, max_size=4)
+
+
+def felt(z: Sequence[float], terrain: Terrain = NOTHING, x: float = 0.0,
+         swung: Sequence[float] = (STANDING,) * 4, touches: Sequence[bool] = (True,) * 4
+         ) -> tuple[Terrain, tuple[float, ...]]:
+    feet: list[Triple] = [
+        (x + a, b, up) for (a, b), up in zip(PLACES, z, strict=True)]
+    return terrain.felt((x, 0.0, 0.3), feet, UP, swung, touches, LENGTH)
+
+
+@given(heights)
+def test_even_ground_leaves_nothing(z: list[float]) -> None:
+    z = (np.array(z) * UNEVEN * LENGTH).tolist()  # spread over UNEVEN l at most
+    assert felt(z, felt(z)[0]) == (felt(z)[0], LEVEL_FEET)
+    assert felt(z)[0].rough == 0.0
+
+
+@given(heights)
+def test_first_step_leads_up(z: list[float]) -> None:
+    z = (np.array(z) * STEP * LENGTH).tolist()
+    rough = felt(z)[0].rough
+    assert (rough > 0.0) == (max(z) - np.median(z) > STEP * LENGTH)
+    assert rough == 0.0 or rough == pytest.approx(max(z) - min(z))
+
+
+@pytest.mark.parametrize('z', [(0.0, 0.0, 0.0, -0.3), (0.06, 0.0, 0.0, -0.1)])
+def test_foot_that_hangs_in_a_gap_tells_nothing(z: tuple[float, ...]) -> None:
+    terrain, level = felt(z)
+    assert (terrain.rough, level) == (0.0, LEVEL_FEET)
+
+
+@pytest.mark.parametrize('calm', [False, True])
+def test_body_that_is_not_calm_feels_no_first_step(calm: bool) -> None:
+    """On what is known to be rough it goes on to feel: bodies tilt there."""
+    feet: list[Triple] = [(a, b, up) for (a, b), up in zip(PLACES, (0.1, 0, 0, 0), strict=True)]
+    said = UP, (STANDING,) * 4, (True,) * 4, LENGTH, calm
+    assert (NOTHING.felt((0.0, 0.0, 0.3), feet, *said)[0].rough > 0.0) == calm
+    assert KNOWN.felt((0.0, 0.0, 0.3), feet, *said)[0].rough == pytest.approx(0.1)
+
+
+@given(heights)
+def test_feet_stand_where_the_ground_is(z: list[float]) -> None:
+    terrain, level = felt(z, KNOWN)
+    spread = max(z) - min(z)
+    if spread > KNOWN.rough:
+        assert terrain.rough == pytest.approx(min(spread, HIGHEST * LENGTH))
+        assert np.array(level) + RAISED * terrain.rough == pytest.approx(np.array(z) - np.mean(z))
+    else:
+        assert terrain.rough == KNOWN.rough
+
+
+def test_slope_of_the_plane_is_even() -> None:
+    normal = (-0.6, 0.0, 0.8)
+    feet = [(x, y, 0.75 * x) for x, y in PLACES]
+    terrain, level = NOTHING.felt((0.0, 0.0, 0.3), feet, normal, (STANDING,) * 4, (True,) * 4,
+                                    LENGTH)
+    assert (terrain.rough, level) == (0.0, LEVEL_FEET)
+
+
+def test_memory_fades_on_the_way_alone() -> None:
+    terrain, _ = felt((0.1, 0.0, 0.0, 0.0))
+    flat = (0.0,) * 4
+    assert felt(flat, terrain)[0].rough == terrain.rough == pytest.approx(0.1)
+    step, x, level = 0.5 * JUMP * LENGTH, 0.0, None
+    while terrain.rough:
+        x += step
+        before, (terrain, level) = terrain.rough, felt(flat, terrain, x)
+        assert terrain.rough < before
+    assert x == pytest.approx(FADES * LENGTH * np.log(0.1 / (FORGOTTEN * LENGTH)), abs=2.0 * step)
+    assert level == LEVEL_FEET
+
+
+def test_swinging_foot_that_touches_tells_a_step() -> None:
+    terrain = felt((0.0,) * 4, KNOWN)[0]
+    swung, touches = (SWINGING, STANDING, STANDING, STANDING), (True,) * 4
+    met, _ = felt((0.05, 0.0, 0.0, 0.0), terrain, swung=swung, touches=touches)
+    assert met.rough == pytest.approx(0.05 + MARGIN * LENGTH)
+    missed, _ = felt((0.05, 0.0, 0.0, 0.0), terrain, swung=swung, touches=(False, *touches[1:]))
+    assert missed.rough == KNOWN.rough
+    assert felt((0.05, 0.0, 0.0, 0.0), felt((0.0,) * 4)[0], swung=swung)[0].rough == 0.0
+    assert missed.footholds == terrain.footholds  # where it swings is no foothold
+
+
+def test_foot_in_the_air_looks_for_the_ground_where_it_is_rough() -> None:
+    swung, touches = (1.2, STANDING, STANDING, STANDING), (False, True, True, True)
+    for z in ((0.0,) * 4, (0.1, 0.0, 0.0, 0.0)):
+        terrain, stood = felt(z)
+        _, level = felt(z, terrain, swung=swung, touches=touches)
+        searched = SEARCHED * LENGTH if terrain.rough else 0.0
+        assert np.array(stood) - level == pytest.approx((searched, 0.0, 0.0, 0.0))
+
+
+def test_estimate_that_begins_anew_forgets() -> None:
+    terrain, _ = felt((0.1, 0.0, 0.0, 0.0))
+    assert felt((0.0,) * 4, terrain, x=2.0 * JUMP * LENGTH)[0].rough == 0.0

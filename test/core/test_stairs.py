@@ -1,0 +1,25 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The robot climbs stairs of 10 cm blind, and forgets them on even ground."""
+
+from __future__ import annotations
+
+from dmp_cpg_ros.core.robot_model.world import Steps
+from dmp_cpg_ros.studies.walking_trials import Walk
+
+HIGHEST_STEP = 0.1
+ON_TOP = 1.6
+
+
+def test_trot_climbs_two_stairs_and_forgets_them() -> None:
+    run = Walk('trot', world=Steps(height=HIGHEST_STEP, depth=0.3, count=2, platform=4.0), seed=3)
+    run.loop.command(0.5)
+    roughest = 0.0
+    while run.state.base_position_in_world[0] < ON_TOP and run.state.time_ns < 12e9:
+        assert run.walk(0.1)
+        rough = run.loop.posture.balance.terrain.rough
+        roughest = max(roughest, rough)
+    assert run.state.base_position_in_world[0] >= ON_TOP
+    assert run.state.base_position_in_world[2] > 2.0 * HIGHEST_STEP + 0.2
+    assert roughest > HIGHEST_STEP
+    assert rough < roughest
