@@ -247,7 +247,8 @@ class PostureController:
         terrain, level = self._ground(
             memory.terrain, state, [foot for foot, _ in legs],
             [position / (1.0 - duty) + 0.5 for position in positions],
-            self.scale.foot_speed(*reference, gait.apart)
+            gait.firm >= 1.0 and max(
+                self.scale.foot_speed(*reference), self.scale.foot_speed(*measured))
             < SLOW * self.scale.speed(gait.highest(self.scale)))
         return PostureState(activity, integral, plan, offset, terrain), PostureFeedback(
             self._torque(body, legs, feet, load, planned, bounce, acceleration),

@@ -17,10 +17,11 @@ A foot that is to stand and touches nothing goes on down, by ``SEARCHED`` l.
 
 **Rough.** ρ is the height of what the feet are to be lifted over. It is 0 until one foothold is
 higher than the median of all by more than ``STEP`` l, l the length of the leg, under a body that
-does not roll, for after a push it feels steps where there are none, and that walks at less than
-``SLOW`` of its gait's highest speed: near that the footholds of a walk and a bound differ as much
-on even ground. A lower one tells nothing: the foot may as well hang in a gap, and to look for the
-ground there, or to count on it, overturns the robot. From there on ρ grows to
+does not roll, for after a push it feels steps where there are none; that is at less than ``SLOW``
+of its gait's highest speed, near which the footholds of a walk differ as much on even ground; and
+that is borne by both sides and both ends (``firm``): a pronk that brakes pitches as much. A lower
+one tells nothing: the foot may as well hang in a gap, and to look for the ground there, or to
+count on it, overturns the robot. From there on ρ grows to
 
 - max e − min e, where this is more than ``UNEVEN`` l: feet stand on steps, up or down;
 - h + ``MARGIN`` l for a foot that touches something in the middle of its swing, at h over the mean
@@ -52,7 +53,7 @@ ROLLING = 0.17
 """Sine of the body's roll to its ground, 10 degrees, up to which it may tell the first step."""
 
 SLOW = 0.5
-"""Share of a gait's highest speed up to which it may, of the reference."""
+"""Share of a gait's highest speed below which it may, of the reference and of the body."""
 
 SCUFFING = (0.25, 0.8)
 """Shares of the swing between which a foot that touches something has met an obstacle."""
