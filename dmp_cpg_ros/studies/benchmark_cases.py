@@ -44,6 +44,9 @@ HIGHER: tuple[Ground, ...] = (('steps', {'height': 0.15, **STAIRS}),)
 
 CLIMBER = 'robots/go2.yaml'
 
+CLIMBING: dict[Values, str] = {(): 'off', (('climbing', True),): 'on'}
+"""The parameter, without and with which stairs are walked at."""
+
 UNTUNED = 100
 """First seed on harder grounds: those below were looked at in between."""
 

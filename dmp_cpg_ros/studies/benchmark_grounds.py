@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -70,19 +70,33 @@ def obstacles(workers: Workers, seeds: int, phases: int) -> Table:
         'way back m, least'), rows, [(case, one._asdict()) for case, one in results])
 
 
+def climbing(workers: Workers, seeds: int, phases: int) -> Table:
+    """Crossings of stairs with each of ``CLIMBING``."""
+    return _compared('Stairs, blind, at 0.5 m/s within a tenth', 'climbing', workers, seeds,
+                     given.ROUGHER[:1], given.CLIMBING, given.UNTUNED)
+
+
 def contacts(workers: Workers, seeds: int, phases: int) -> Table:
     """Crossings of rough ground with each of ``FEELING``."""
-    walks, rows = product(given.FELT_GROUNDS, given.ROUGH_GAITS, given.FEELING), []
-    results = _crossings(workers, seeds, walks)
+    return _compared('Feeling the ground, blind, at 0.5 m/s within a tenth', 'feels', workers,
+                     seeds, given.FELT_GROUNDS, given.FEELING)
+
+
+def _compared(title: str, what: str, workers: Workers, seeds: int,
+              grounds: Sequence[given.Ground], ways: Mapping[given.Values, str], first: int = 0
+              ) -> Table:
+    """Crossings of the same grounds with other parameters, each of which has words."""
+    results, rows = _crossings(
+        workers, seeds, product(grounds, given.ROUGH_GAITS, ways), first), []
     for case, words, of, shares in _groups(results, seeds):
-        feels = given.FEELING[case['values']]
-        rows.append((f'{case["kind"]}, {words}', case['gait'], feels, *shares,
+        rows.append((f'{case["kind"]}, {words}', case['gait'], ways[case['values']], *shares,
+                     str(sum(outcome.blocked for outcome in of)),
                      f'{np.mean([outcome.distance for outcome in of]):.2f}',
                      f'{np.mean([outcome.distance / outcome.time for outcome in of]):.3f}',
                      f'{np.nanmean([outcome.tilt for outcome in of]):.2f}'))
-    return Table('Feeling the ground, blind, at 0.5 m/s within a tenth',
-                 ('ground', 'gait', 'feels', 'seeds', 'crossed 5 m', 'fell', 'mean distance m',
-                  'mean speed m/s', 'tilt rms deg'), rows, results)
+    return Table(title, ('ground', 'gait', what, 'seeds', 'crossed 5 m', 'fell',
+                         'stopped as blocked', 'mean distance m', 'mean speed m/s',
+                         'tilt rms deg'), rows, results)
 
 
 def _crossings(workers: Workers, seeds: int, walks: Iterator[tuple[Any, ...]],

@@ -8,8 +8,9 @@ on blocks too, with and without quicker steps. manoeuvres: falls by pushes at re
 starting, changing gait and turning. unpushed: stops that nobody pushes against. rough: share of
 seeds that cross 5 m of rough ground; rougher, higher: of harder grounds, and of stairs on a robot
 with longer legs. obstacles: steps that are too high. contacts: rough ground with and without the
-feedback of touchdown and the stumbling reflex. delays: targets that arrive late. starved: those of
-controllers that do not get to run. mismatch: a robot that is not as its controllers know it.
+feedback of touchdown and the stumbling reflex. climbing: stairs without and with what all legs
+share of one foot's step. delays: targets that arrive late. starved: those of controllers that do
+not get to run. mismatch: a robot that is not as its controllers know it.
 gaits: every ordered pair of gaits changed while moving; fast_gaits: at the highest speeds,
 forwards and backwards, of other robots too. restarts: posture control that forgets all in the
 middle of a stride, as a node that is started again. robots: other robots, with their files alone;
@@ -270,7 +271,8 @@ def robots(workers: Workers, seeds: int, phases: int) -> Table:
 TABLES = {make.__name__: make for make in (
     speeds, benchmark_pushes.pushes, benchmark_pushes.timing, benchmark_pushes.manoeuvres,
     benchmark_pushes.unpushed, grounds.rough, grounds.rougher, grounds.higher, grounds.obstacles,
-    grounds.contacts, delays, starved, mismatch, gaits, fast_gaits, restarts, robots)}
+    grounds.contacts, grounds.climbing, delays, starved, mismatch, gaits, fast_gaits, restarts,
+    robots)}
 """What can be measured."""
 
 

@@ -12,7 +12,8 @@ ON_TOP = 1.6
 
 
 def test_trot_climbs_two_stairs_and_forgets_them() -> None:
-    run = Walk('trot', world=Steps(height=HIGHEST_STEP, depth=0.3, count=2, platform=4.0), seed=3)
+    run = Walk('trot', world=Steps(height=HIGHEST_STEP, depth=0.3, count=2, platform=4.0), seed=3,
+               values=(('climbing', True),))
     run.loop.command(0.5)
     roughest = 0.0
     while run.state.base_position_in_world[0] < ON_TOP and run.state.time_ns < 12e9:

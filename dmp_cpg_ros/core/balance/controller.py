@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, 
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.balance.progress import feet_behind
-from dmp_cpg_ros.core.balance.terrain import LEVEL_FEET, ROLLING, SLOW, Terrain
+from dmp_cpg_ros.core.balance.terrain import LEVEL_FEET, NOTHING_FELT, ROLLING, SLOW, Terrain
 from dmp_cpg_ros.core.balance.unfelt import as_planned
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
@@ -126,7 +126,7 @@ class PostureState(NamedTuple):
     integral: VelocityCorrection = VelocityCorrection()
     plan: MotionPlan = MotionPlan()
     offset: MassOffset = MassOffset()
-    terrain: Terrain = Terrain()
+    terrain: Terrain = NOTHING_FELT
 
 
 class PostureController:
@@ -244,12 +244,14 @@ class PostureController:
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(gait, positions, duty, omega, moving)
         acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
-        terrain, level = self._ground(
-            memory.terrain, state, [foot for foot, _ in legs],
-            [position / (1.0 - duty) + 0.5 for position in positions],
-            gait.firm >= 1.0 and max(
-                self.scale.foot_speed(*reference), self.scale.foot_speed(*measured))
-            < SLOW * self.scale.speed(gait.highest(self.scale)))
+        terrain, level = NOTHING_FELT, LEVEL_FEET
+        if p.climbing:
+            limit = SLOW * self.scale.speed(gait.highest(self.scale))
+            terrain, level = self._ground(
+                memory.terrain, state, [foot for foot, _ in legs],
+                [position / (1.0 - duty) + 0.5 for position in positions],
+                gait.firm >= 1.0 and self.scale.foot_speed(*reference) < limit
+                and self.scale.foot_speed(*measured) < limit)
         return PostureState(activity, integral, plan, offset, terrain), PostureFeedback(
             self._torque(body, legs, feet, load, planned, bounce, acceleration),
             np.array([part for (x, y), up in zip(shift, raised, strict=True)

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Memory of how rough the ground is, which all legs share.
+"""Memory of how rough the ground is, which all legs share where ``climbing`` is on.
 
 A leg that feels alone learns of every step by tripping over it, and it stands on a step as if that
 were level: it goes back to the height of the others and throws the body to its side. What one foot
@@ -86,7 +86,7 @@ SEARCHED = 0.25
 leg; no further than it can reach.
 """
 
-LEVEL_FEET = (0.0, 0.0, 0.0, 0.0)
+LEVEL_FEET: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 """Heights of feet that stand in the plane [m]."""
 
 
@@ -159,3 +159,7 @@ class Terrain(NamedTuple):
             height - mean - RAISED * rough - (
                 SEARCHED * leg_length if share > 1.0 and not touch else 0.0)
             for height, share, touch in zip(heights, swung, touches, strict=True))
+
+
+NOTHING_FELT = Terrain()
+"""Before the first foothold."""
