@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dmp_cpg_ros.core.robot_model.world import Steps
+from dmp_cpg_ros.core.balance.terrain import NOTHING_FELT
+from dmp_cpg_ros.core.robot_model.grounds import Steps
 from dmp_cpg_ros.studies.walking_trials import Walk
 
 HIGHEST_STEP = 0.1
@@ -24,3 +25,12 @@ def test_trot_climbs_two_stairs_and_forgets_them() -> None:
     assert run.state.base_position_in_world[2] > 2.0 * HIGHEST_STEP + 0.2
     assert roughest > HIGHEST_STEP
     assert rough < roughest
+
+
+def test_without_climbing_nothing_is_remembered() -> None:
+    run = Walk('trot', world=Steps(height=HIGHEST_STEP, depth=0.3, count=2, platform=4.0), seed=3)
+    run.loop.command(0.5)
+    assert run.walk(2.5)
+    assert run.loop.posture.balance.terrain == NOTHING_FELT
+    feedback = run.loop.tick(run.state).feedback
+    assert feedback.level == (0.0,) * 4 and feedback.progress.rough == 0.0
