@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
-from dmp_cpg_ros.core.balance.terrain import NOTHING_FELT
+import pytest
+
+from dmp_cpg_ros.core.balance.terrain import NOTHING_FELT, Terrain
 from dmp_cpg_ros.core.robot_model.grounds import Steps
 from dmp_cpg_ros.studies.walking_trials import Walk
 
@@ -34,3 +36,21 @@ def test_without_climbing_nothing_is_remembered() -> None:
     assert run.loop.posture.balance.terrain == NOTHING_FELT
     feedback = run.loop.tick(run.state).feedback
     assert feedback.level == (0.0,) * 4 and feedback.progress.rough == 0.0
+
+
+@pytest.mark.parametrize(('gait', 'speed', 'tells'), [
+    ('trot', 0.5, True), ('trot', 2.5, False), ('pronk', 0.3, False), ('pace', 0.3, False)])
+def test_first_step_is_told_slowly_and_on_both_sides_and_ends_alone(
+        gait: str, speed: float, tells: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    calm, felt = [], Terrain.felt
+
+    def noted(self: Terrain, *args: object) -> object:
+        calm.append(args[-1])
+        return felt(self, *args)
+
+    run = Walk(gait, values=(('climbing', True),))
+    run.loop.command(speed)
+    assert run.walk(2.5)
+    monkeypatch.setattr(Terrain, 'felt', noted)
+    assert run.walk(0.5)
+    assert len(calm) > 100 and set(calm) == {tells}
