@@ -244,14 +244,10 @@ class PostureController:
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(gait, positions, duty, omega, moving)
         acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
-        terrain, level = NOTHING_FELT, LEVEL_FEET
-        if p.climbing:
-            limit = SLOW * self.scale.speed(gait.highest(self.scale))
-            terrain, level = self._ground(
-                memory.terrain, state, [foot for foot, _ in legs],
-                [position / (1.0 - duty) + 0.5 for position in positions],
-                gait.firm >= 1.0 and self.scale.foot_speed(*reference) < limit
-                and self.scale.foot_speed(*measured) < limit)
+        terrain, level = self._ground(
+            memory.terrain, state, [foot for foot, _ in legs],
+            [position / (1.0 - duty) + 0.5 for position in positions], gait, (reference, measured)
+        ) if p.climbing else (NOTHING_FELT, LEVEL_FEET)
         return PostureState(activity, integral, plan, offset, terrain), PostureFeedback(
             self._torque(body, legs, feet, load, planned, bounce, acceleration),
             np.array([part for (x, y), up in zip(shift, raised, strict=True)
@@ -268,18 +264,23 @@ class PostureController:
                 terrain.rough), felt or FELT, level)
 
     def _ground(self, terrain: Terrain, state: RobotState, feet_in_base: Sequence[Triple],
-                swung: Sequence[float], slow: bool) -> tuple[Terrain, tuple[float, ...]]:
-        """Memory of the ground, and heights of the feet over its plane."""
+                swung: Sequence[float], gait: GaitInForce, velocities: Sequence[Triple]
+                ) -> tuple[Terrain, tuple[float, ...]]:
+        """Memory of the ground, and heights of the feet over its plane [m]; a body tells a first
+        step at low velocities (v_x, v_y [m/s], γ [rad/s]) of the reference and its own only.
+        """
         R_world_base = vec3.rotation(state.base_quaternion.tolist())
         place = vec3.triple(state.base_position_in_world.tolist())
         normal = state.ground_normal_in_world
         n = UP if normal is None else vec3.triple(normal.tolist())
+        limit = SLOW * self.scale.speed(gait.highest(self.scale))
+        calm = (gait.firm >= 1.0 and abs(vec3.dot(n, vec3.times(R_world_base, LEFT))) < ROLLING
+                and all(self.scale.foot_speed(*velocity) < limit for velocity in velocities))
         return terrain.felt(
             place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot in feet_in_base],
             n, swung,
             [force > self._touch_force for force in believed(state.foot_force).tolist()],
-            self.scale.leg_length,
-            slow and abs(vec3.dot(n, vec3.times(R_world_base, LEFT))) < ROLLING)
+            self.scale.leg_length, calm)
 
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], swings: list[float],
                  under: Pair, error: Pair) -> tuple[float, ...]:

@@ -67,8 +67,8 @@ def room(margins: Sequence[float] | None, leg_length: float, wide: float) -> flo
 
 def followed_share(share: float, left: float | None, dt: float, most: float = 1.0,
                    least: float = LEAST) -> float:
-    """Share of the command after a tick of dt [s], in [LEAST, 1], from the one before,
-    :func:`room`, and the most that may be followed and least that it leaves.
+    """Share of the command after a tick of dt [s], in [least, 1], from the one before,
+    :func:`room`, and the most and the least that may be followed.
     """
     regained = min(most, share + REGAIN * dt)
     if left is None:

@@ -109,7 +109,9 @@ def heading_frame(z_in_base: Triple) -> Matrix:
 
 
 def damped_solution(J: Matrix, velocity: Triple) -> Triple:
-    """Solve J q̇ = v by Cramer's rule; damped near singular matrices."""
+    """q̇ [rad/s], three numbers, of J q̇ = v by Cramer's rule, with J (3, 3) [m] and v [m/s]; damped
+    near singular matrices.
+    """
     (a, b, c), (d, e, f), (g, h, i) = J
     x, y, z = velocity
     minor_0, minor_1, minor_2 = e * i - f * h, f * g - d * i, d * h - e * g
