@@ -4,14 +4,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.balance.terrain import NOTHING_FELT, Terrain
 from dmp_cpg_ros.core.robot_model.grounds import Steps
-from dmp_cpg_ros.studies.walking_trials import Walk
+from dmp_cpg_ros.studies.walking_trials import Walk, attitude
 
 HIGHEST_STEP = 0.1
-ON_TOP = 1.6
+ON_TOP, DOWN = 1.6, 3.2
 
 
 def test_trot_climbs_two_stairs_and_forgets_them() -> None:
@@ -27,6 +28,19 @@ def test_trot_climbs_two_stairs_and_forgets_them() -> None:
     assert run.state.base_position_in_world[2] > 2.0 * HIGHEST_STEP + 0.2
     assert roughest > HIGHEST_STEP
     assert rough < roughest
+
+
+def test_trot_comes_down_stairs_without_diving() -> None:
+    """At the foot of the way down a plane through the footholds leans by 27 degrees."""
+    run = Walk('trot', world=Steps(height=HIGHEST_STEP, depth=0.3, count=3, platform=0.6), seed=4,
+               values=(('climbing', True),))
+    run.loop.command(0.5)
+    steepest = 0.0
+    while run.state.base_position_in_world[0] < DOWN and run.state.time_ns < 16e9:
+        assert run.walk(0.1)
+        steepest = max(steepest, float(np.abs(attitude(run.states[-1:])[:, 1]).max()))
+    assert run.state.base_position_in_world[0] >= DOWN
+    assert steepest < np.deg2rad(20.0)
 
 
 def test_without_climbing_nothing_is_remembered() -> None:

@@ -44,7 +44,7 @@ from dmp_cpg_ros.core.transformation.leg import LegFeedback, body_scale, nominal
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
 
-LEFT, UP = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+LEFT = (0.0, 1.0, 0.0)
 
 LARGEST_LOAD = 2.0
 """Largest normal force of a fully loaded foot, in weights of the robot."""
@@ -205,7 +205,8 @@ class PostureController:
         positions = [gait.scalar_cycle_position(scalar_phase(x_1, x_2) + p.target_lead * rate)
                      for (x_1, x_2), rate in zip(x.tolist(), rates, strict=True)]
         load = virtual_model.contact_weights(positions, duty, swings, p.load_transfer)
-        R_ground_base, upward = ground_from_base(state, p.slope_following)
+        R_ground_base, upward = ground_from_base(
+            state, p.slope_following * memory.terrain.followed)
         felt = state.felt_legs
         if felt is not None:
             if state.feels_nothing:
@@ -245,7 +246,7 @@ class PostureController:
         bounce = self._bounce(gait, positions, duty, omega, moving)
         acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
         terrain, level = self._ground(
-            memory.terrain, state, [foot for foot, _ in legs],
+            memory.terrain, state, R_ground_base[2], [foot for foot, _ in legs],
             [position / (1.0 - duty) + 0.5 for position in positions], gait, (reference, measured)
         ) if p.climbing else (NOTHING_FELT, LEVEL_FEET)
         return PostureState(activity, integral, plan, offset, terrain), PostureFeedback(
@@ -263,16 +264,16 @@ class PostureController:
                 plan.expected, beside, feet, self._footholds, positions, duty, omega),
                 terrain.rough), felt or FELT, level)
 
-    def _ground(self, terrain: Terrain, state: RobotState, feet_in_base: Sequence[Triple],
-                swung: Sequence[float], gait: GaitInForce, velocities: Sequence[Triple]
-                ) -> tuple[Terrain, tuple[float, ...]]:
-        """Memory of the ground, and heights of the feet over its plane [m]; a body tells a first
-        step at low velocities (v_x, v_y [m/s], γ [rad/s]) of the reference and its own only.
+    def _ground(self, terrain: Terrain, state: RobotState, normal_in_base: Triple,
+                feet_in_base: Sequence[Triple], swung: Sequence[float], gait: GaitInForce,
+                velocities: Sequence[Triple]) -> tuple[Terrain, tuple[float, ...]]:
+        """Memory of the ground, and heights of the feet over the plane with a normal that the body
+        follows [m]; a body tells a first step at low velocities (v_x, v_y [m/s], γ [rad/s]) of the
+        reference and its own only.
         """
         R_world_base = vec3.rotation(state.base_quaternion.tolist())
         place = vec3.triple(state.base_position_in_world.tolist())
-        normal = state.ground_normal_in_world
-        n = UP if normal is None else vec3.triple(normal.tolist())
+        n = vec3.times(R_world_base, normal_in_base)
         limit = SLOW * self.scale.speed(gait.highest(self.scale))
         calm = (gait.firm >= 1.0 and abs(vec3.dot(n, vec3.times(R_world_base, LEFT))) < ROLLING
                 and all(self.scale.foot_speed(*velocity) < limit for velocity in velocities))

@@ -13,7 +13,9 @@ follows, foot i stands
     e_i = n · p_i − mean_j n · p_j
 
 over that plane, and is left there: its path has its stance at e_i − ``RAISED`` ρ instead of 0.
-A foot that is to stand and touches nothing goes on down, by ``SEARCHED`` l.
+A foot that is to stand and touches nothing goes on down, by ``SEARCHED`` l. The plane leans as the
+footholds do only by the share ``FOLLOWED``: between two steps it is too steep, most of all at the
+foot of a way down, where a body that follows it dives.
 
 **Rough.** ρ is the height of what the feet are to be lifted over. It is 0 until one foothold is
 higher than the median of all by more than ``STEP`` l, l the length of the leg, under a body that
@@ -81,6 +83,9 @@ JUMP = 1.0
 RAISED = 0.3
 """By how much of ρ the legs stand longer, so that trunk and knees stay clear of edges."""
 
+FOLLOWED = 0.5
+"""Share of the slope of the footholds that the body follows where it is rough."""
+
 SEARCHED = 0.25
 """How much deeper a foot looks for ground that is not where its stance begins, in lengths of the
 leg; no further than it can reach.
@@ -106,6 +111,11 @@ class Terrain(NamedTuple):
     rough: float = 0.0
     footholds: tuple[Triple, ...] = ()
     place: Triple = (0.0, 0.0, 0.0)
+
+    @property
+    def followed(self) -> float:
+        """Share of the slope of the footholds that the body follows."""
+        return FOLLOWED if self.rough else 1.0
 
     def felt(self, place: Triple, feet: Sequence[Triple], normal: Triple,
              swung: Sequence[float], touches: Sequence[bool], leg_length: float,

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.balance.terrain import (
     FADES,
+    FOLLOWED,
     FORGOTTEN,
     HIGHEST,
     JUMP,
@@ -129,3 +130,8 @@ def test_foot_in_the_air_looks_for_the_ground_where_it_is_rough() -> None:
 def test_estimate_that_begins_anew_forgets() -> None:
     terrain, _ = felt((0.1, 0.0, 0.0, 0.0))
     assert felt((0.0,) * 4, terrain, x=2.0 * JUMP * LENGTH)[0].rough == 0.0
+
+
+def test_body_leans_less_than_the_footholds_where_it_is_rough() -> None:
+    assert NOTHING.followed == 1.0
+    assert KNOWN.followed == FOLLOWED < 1.0
