@@ -30,6 +30,11 @@ WIDENING_S, NARROWING_S = 2.0, 0.5
 narrow again where it moves [s].
 """
 
+FORGETTING = 250.0
+"""Rate at which heading and widened limit are forgotten for each e-fold of the legs' activity
+[1/s].
+"""
+
 MEAN = 0.5
 """Rate at which the mean tilt follows, in √(g/l)."""
 
@@ -86,7 +91,8 @@ class VelocityCorrection(NamedTuple):
         froude, wanted = (GRAVITY * leg_length) ** 0.5, plan.expected
         wide = self.wide + dt * (1.0 / WIDENING_S if plan.behind < SETTLED * froude
                                  else -1.0 / NARROWING_S)
-        wide = clamped(wide, 0.0, 1.0) * moving
+        left = moving ** (FORGETTING * dt)
+        wide = clamped(wide, 0.0, 1.0) * left
         share = p.speed_correction_limit + wide * max(
             p.speed_mismatch_limit - p.speed_correction_limit, 0.0)
         limit = share * max(hypot(*wanted), SLOWEST * froude)
@@ -96,7 +102,7 @@ class VelocityCorrection(NamedTuple):
         along = clamped(along + gain * (should_along - velocity[0]), -limit, limit) * kept
         across = clamped(across + gain * (should_across - velocity[1]), -limit, limit) * kept
         turn = 0.0 if isnan(self.yaw) else (yaw - self.yaw + pi) % (2.0 * pi) - pi
-        error = (self.heading_error + gamma * dt - turn) * moving
+        error = (self.heading_error + gamma * dt - turn) * left
         return VelocityCorrection(
             (along, across), clamped(error, -p.heading_limit, p.heading_limit), yaw, wide)
 

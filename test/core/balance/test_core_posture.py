@@ -276,6 +276,21 @@ def test_more_is_corrected_while_the_reference_stands_still() -> None:
     assert np.abs(np.diff(back)).max() < 0.03 * wide
 
 
+@pytest.mark.parametrize('moving', [0.98, 0.9])
+def test_slow_loops_forget_with_time_and_not_with_ticks(moving: float) -> None:
+    """What legs that hardly move forget does not depend on the rate of the controller."""
+    p, length, plan = PostureParameters(), 0.28, MotionPlan(expected=(0.5, 0.0))
+    ends = []
+    for ticks in (100, 400):
+        loop = VelocityCorrection(heading_error=0.2, yaw=0.0, wide=0.8)
+        for _ in range(ticks):
+            loop = loop.integrated(p, length, moving, (0.0, 0.0, 0.0, 1.0), (0.5, 0.0, 0.0), plan,
+                                   0.0, 0.1 / ticks)
+        ends.append((loop.heading_error, loop.wide))
+    assert ends[0] == pytest.approx(ends[1], rel=0.02)
+    assert ends[0][0] < 0.15
+
+
 @pytest.mark.parametrize(('tilt', 'place'), [
     ((-0.1, 0.0), (0.0, 1.0)), ((0.1, 0.0), (0.0, -1.0)),
     ((0.0, 0.1), (1.0, 0.0)), ((0.0, -0.1), (-1.0, 0.0))])
