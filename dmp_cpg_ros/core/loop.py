@@ -36,13 +36,14 @@ from dmp_cpg_ros.core.modes.body_control import BodyControl
 from dmp_cpg_ros.core.modes.leg_control import LegControl
 from dmp_cpg_ros.core.modes.manager import ModeState
 from dmp_cpg_ros.core.modes.requests import REQUESTS
+from dmp_cpg_ros.core.parameters import check_names
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceSystem
 from dmp_cpg_ros.core.reference.governor import Governor
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
-from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.core.suite_parameters import OWNER, SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.core.voting.voters import vote_sensors
 from dmp_cpg_ros.core.voting.votes import VoteInbox
@@ -239,8 +240,9 @@ class WalkingLoop:
         Raises
         ------
         ParameterError
-            If a value is impossible.
+            If a value is impossible, or a parameter may not change.
         """
+        check_names(values, tuple(sorted(OWNER)), (), 'change')
         named, canon = self._reader.named, self.canon
         wanted = named(values.get('gait', canon.wanted.name))
         present = self._described(self.parameters, canon.wanted)

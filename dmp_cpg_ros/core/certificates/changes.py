@@ -99,12 +99,12 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
 
 
 def refused_change(parameters: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,
-                   tick_s: float) -> str:
+                   tick_s: float, acting_cadence: float | None = None) -> str:
     """Why changes among some gaits are refused; empty when they are certified.
 
     Parameters
     ----------
-    parameters, scale, tick_s
+    parameters, scale, tick_s, acting_cadence
         As for :func:`certify_changes`.
     gaits : sequence of Gait
         Gaits; one that stands twice counts once.
@@ -112,7 +112,8 @@ def refused_change(parameters: SuiteParameters, gaits: Sequence[Gait], scale: Bo
     different = list({gait.name: gait for gait in gaits}.values())
     if len(different) < 2:
         return ''
-    certificate = certify_changes(parameters, different, scale, tick_s, required_only=True)
+    certificate = certify_changes(parameters, different, scale, tick_s, acting_cadence,
+                                  required_only=True)
     if certificate.holds:
         return ''
     return (f'changes among {", ".join(gait.name for gait in different)} are not certified: '

@@ -111,8 +111,9 @@ class Running:
 
     @property
     def moving(self) -> bool:
-        """Whether the cadence that acts is not that of the parameters."""
-        return self.acting_cadence not in (None, self.parameters.canonical.cadence_scale)
+        """Whether the cadence that acts is not that of the parameters, but for rounding."""
+        return self.acting_cadence is not None and not math.isclose(
+            self.acting_cadence, self.parameters.canonical.cadence_scale)
 
     def time_to_rest(self, network: GaitNetwork, x: Array, r: Array,
                      quickness: float = 1.0) -> float:
@@ -245,8 +246,7 @@ class Verdict:
     Attributes
     ----------
     certificate, settled : Certificate
-        With the change, for every cadence on the way to that of the parameters; and, where it is
-        accepted, for that one.
+        With the change, for every cadence on the way to that of the parameters; and for that one.
     accepted : bool
         Whether no inequality is lost by it.
     reason : str
@@ -282,18 +282,18 @@ class Change:
         """Judge: accepted when every required inequality holds, or, where the running parameters
         have no certificate to lose, when none gets worse.
         """
-        certificate, held = self.proposed.certificate(), self.held
+        certificate, settled = self.proposed.certificate(), self.proposed.settled.certificate()
         refused = self.gaits and refused_change(
-            self.proposed.parameters, self.gaits, self.proposed.scale, self.proposed.tick_s)
+            self.proposed.parameters, self.gaits, self.proposed.scale, self.proposed.tick_s,
+            self.proposed._of_certificate.acting_cadence)
         if refused:
-            return Verdict(certificate, certificate, False, refused)
+            return Verdict(certificate, settled, False, refused)
         lost = [entry for entry in certificate.failing
-                if held[entry.name].holds or entry.margin < held[entry.name].margin]
+                if self.held[entry.name].holds or entry.margin < self.held[entry.name].margin]
         if not lost:
-            return Verdict(certificate, self.proposed.settled.certificate(), True)
+            return Verdict(certificate, settled, True)
         reason = ' | '.join(entry.explained() for entry in lost)
-        return Verdict(certificate, certificate, False,
-                       f'{reason}; {self._nearest(held.holds)}')
+        return Verdict(certificate, settled, False, f'{reason}; {self._nearest(self.held.holds)}')
 
     def covers(self, other: Change) -> bool:
         """Whether the verdict on this change is one on another, in which a cadence acts that lies

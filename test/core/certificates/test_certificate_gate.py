@@ -116,6 +116,36 @@ def test_a_verdict_covers_the_cadences_between_that_act_and_no_other_change() ->
     assert not judged.covers(replace(judged, present=judged.present.changed({'rho': 7.0})))
 
 
+def test_change_of_gait_is_judged_at_the_cadence_that_acts() -> None:
+    """A change of gait begins at the cadence that acts, on its way to the one that is wanted."""
+    wanted = RUNNING.changed({'inhibition_gain': 600.0})
+    quick = replace(wanted, acting_cadence=1.99)
+    gaits = (GAITS['amble'], GAITS['trot'])
+
+    def verdict(present: Running):
+        return Change(present, wanted.certificate(), replace(present, gait=gaits[1]),
+                      gaits).verdict()
+
+    assert verdict(wanted).accepted
+    assert not verdict(quick).accepted
+    assert not verdict(wanted.changed({'cadence_scale': 1.99})).accepted
+    assert verdict(replace(wanted, acting_cadence=1.0 + 1e-12)).accepted
+
+
+def test_refusal_tells_the_certificate_of_a_cadence_that_has_settled() -> None:
+    quick = replace(RUNNING, acting_cadence=2.0)
+    verdict = Change(quick, RUNNING.certificate(),
+                     quick.changed({'inhibition_gain': 300.0})).verdict()
+    assert not verdict.accepted and not verdict.certificate.holds
+    assert verdict.settled.holds
+
+
+def test_rounding_is_no_cadence_on_its_way() -> None:
+    wanted = RUNNING.changed({'cadence_scale': 0.8})
+    assert not replace(wanted, acting_cadence=0.8 * 1.1 / 1.1 * (1.0 + 1e-15)).moving
+    assert replace(wanted, acting_cadence=0.8001).moving
+
+
 def test_without_a_certificate_only_what_makes_it_worse_is_refused() -> None:
     running = RUNNING.changed({'inhibition_gain': 100.0})
     assert judge({'inhibition_gain': 120.0}, running).accepted
@@ -194,6 +224,12 @@ def test_a_refused_change_changes_nothing() -> None:
     for a, b in zip(walk(plain, 50, 100), walk(asked, 50, 100), strict=True):
         np.testing.assert_array_equal(a.x, b.x)
         np.testing.assert_array_equal(a.targets.position, b.targets.position)
+
+
+@pytest.mark.parametrize('values', [{'cadence_scal': 1.2}, {'stiffness': 40.0}])
+def test_what_may_not_change_is_refused_with_what_may(values: dict[str, float]) -> None:
+    with pytest.raises(ParameterError, match='valid are .*cadence_scale'):
+        new_loop().change(values)
 
 
 def test_an_accepted_change_does_not_jump() -> None:
