@@ -177,8 +177,8 @@ def stepped_network(s: Setting, analysis: NetworkAnalysis) -> SteppedNetwork | N
                     for bound, gains in ((bounds, alpha), (quick, 0.0 * alpha))))
     plain, plain_quick = held.moduli(0.0, omega), free.moduli(0.0, QUICKEST * omega)
     a, b = _stages(plain, alpha * r, disc, rho, r)
-    _, b_free = _stages(plain_quick, 0.0 * alpha, disc, rho, r)
-    if not max(disc, a, b, b_free) < _FARTHEST_STAGE * r:
+    free_stage = max(_stages(plain_quick, 0.0 * alpha, disc, rho, r))
+    if not max(disc, a, b, free_stage) < _FARTHEST_STAGE * r:
         return None
     box = _Box(bounds, plain, omega * r, rho, r, (disc, a, b))
     u, after = box.closed(capture.distance, alpha > 0.0)
@@ -198,7 +198,7 @@ def stepped_network(s: Setting, analysis: NetworkAnalysis) -> SteppedNetwork | N
     slowest = max(np.abs(np.linalg.eigvals(matrix)).max() for matrix in (Z, rates[1]))
     return SteppedNetwork(
         u, farthest, disc, -math.log(max(slowest, 1e-300)) / h,
-        _locking(s, analysis, L, h, max(disc, b_free)), h, Z, bounds.moved(end), rates,
+        _locking(s, analysis, L, h, max(disc, free_stage)), h, Z, bounds.moved(end), rates,
         bounds.forced(middle, end).sum(axis=1) * max(disc, a, b) / r)
 
 

@@ -134,7 +134,8 @@ def time_to_places(s: Setting, x: Array) -> float:
     """Bound on the time in which free legs come to their places, from a state that is known.
 
     Disagreement shrinks at Theorem 4's rate, and the mean of the locked coordinates obeys
-    Ṙ ≥ ρ(r²R − R³ − 3ε²R − ε² max|e|) (:mod:`~dmp_cpg_ros.core.contraction.heterogeneity`).
+    Ṙ ≥ ρ(r²R − R³ − 3ε²R − ε² max|e|) (:mod:`~dmp_cpg_ros.core.contraction.heterogeneity`). The
+    farthest state comes in as one that is alone: ẏ ≤ 2ρy(r² − y) for y = max |x_i|².
 
     Parameters
     ----------
@@ -157,14 +158,35 @@ def time_to_places(s: Setting, x: Array) -> float:
     places, radii = entry.entry_tolerances(network, r0)
     mean, epsilon, pair, single = _disagreement(found.weights, entry.locked(network, x))
     R, step = abs(mean), min(_STEP, 0.1 / (p.rho * p.radius**2))
+    inward = _time_inward(p.rho, p.radius, float(np.hypot(*x.T).max()), p.radius + radii)
     for k in range(round(_HORIZON / _STEP)):
         if epsilon * pair <= places and R - epsilon * single >= p.radius - radii:
-            return k * step
-        R += step * p.rho * ((p.radius**2 - R**2 - 3.0 * epsilon**2) * R - epsilon**3 * single)
+            return max(k * step, inward)
+        R = _raised(R, p.radius**2 - 3.0 * epsilon**2, epsilon**3 * single, p.rho * step)
         epsilon *= math.exp(-found.rate * step)
         if not R > 0.0:
             break
     return math.inf
+
+
+def _raised(R: float, linear: float, constant: float, span: float) -> float:
+    """Lower bound on where R ≥ 0 is after a span of R' = linear R − R³ − constant: the right side
+    is concave, so that it is least at an end of the way.
+    """
+    now = (linear - R * R) * R - constant
+    if now < 0.0:
+        return R + span * min(now, -constant)
+    most = now if linear < 3.0 * R * R else 2.0 * (linear / 3.0) ** 1.5 - constant
+    end = R + span * most
+    return R + span * min(now, (linear - end * end) * end - constant)
+
+
+def _time_inward(rho: float, radius: float, distance: float, to: float) -> float:
+    """Time in which |x| comes from a distance to one that is beyond the radius [s]."""
+    if distance <= to:
+        return 0.0
+    far, near = (math.log(y * y / (y * y - radius**2)) for y in (distance, to))
+    return (near - far) / (2.0 * rho * radius**2)
 
 
 def later_arming(s: Setting, x: Array, r: Array) -> float:

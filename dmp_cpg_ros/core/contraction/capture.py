@@ -31,6 +31,7 @@ from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.contraction.synchronisation import (
     comparison_laplacian,
+    invariant_radius,
     overshoot,
     slowest_rate,
 )
@@ -124,8 +125,8 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     inhibited = gains > 0.0
     D = _target_radius(system, inhibited)
     L = comparison_laplacian(system.graph)
-    largest = float(np.sqrt(max(float(system.radius.max()), D)**2
-                            + overshoot(L) / float(system.rho.min())))
+    largest = invariant_radius(
+        max(float(system.radius.max()), D), overshoot(L), float(system.rho.min()))
     u = known.distance if known else _distances(
         system, L, omega, inhibited, D, region_radius, largest + D)
     needed = known.needed_gain if known else np.where(

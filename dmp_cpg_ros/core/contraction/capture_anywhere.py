@@ -18,7 +18,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian
+from dmp_cpg_ros.core.contraction.synchronisation import (
+    comparison_laplacian,
+    invariant_radius,
+    overshoot,
+)
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.maths import Array
 
@@ -46,12 +50,15 @@ def needed_gain_anywhere(system: CanonicalSystem, omega: float, node: int,
     -------
     float
         max over n of (n·f_i(x_d + r0 n) + Σ_j (‖K_ij‖ R − λ_min(K_ij) n·x_i)) / r0, rounded up
-        [1/s], with R = max(r_i, |x_d|), the radius of the invariant disc.
+        [1/s], with R of the disc that no oscillator leaves and no target is out of.
     """
     reach = float(np.linalg.norm(system.target[node]))
-    largest = max(float(system.radius.max()), reach)
-    L = comparison_laplacian(system.graph)[node]
+    laplacian = comparison_laplacian(system.graph)
+    largest = invariant_radius(max(float(system.radius.max()), reach), overshoot(laplacian),
+                               float(system.rho.min()))
+    L = laplacian[node]
     held, pulled = float(L[node]), float(-L[np.arange(len(L)) != node].sum())
+    turning, pull = Interval.of(abs(omega)) * reach, Interval.of(pulled) * largest
     rho, r_squared = float(system.rho[node]), Interval.of(float(system.radius[node])).square()
     both = Interval.of(reach).square() + Interval.of(region_radius).square()
 
@@ -61,9 +68,9 @@ def needed_gain_anywhere(system: CanonicalSystem, omega: float, node: int,
         along = cosine * reach + region_radius                               # n·x_i
         squared = cosine * (2.0 * reach * region_radius) + both
         radial = rho * ((r_squared - squared) * along)
-        return sine * (abs(omega) * reach) + radial + pulled * largest - held * along
+        return sine * turning + radial + pull - held * along
 
-    return _maximum(outward) / region_radius
+    return float((Interval.of(_maximum(outward)) / region_radius).upper)
 
 
 def _maximum(function: Callable[[Interval], Interval]) -> float:

@@ -30,7 +30,11 @@ from functools import lru_cache
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.coupling import CouplingGraph
-from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, comparison_laplacian
+from dmp_cpg_ros.core.contraction.synchronisation import (
+    Synchronisation,
+    comparison_laplacian,
+    invariant_radius,
+)
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import phi_functions
@@ -129,8 +133,7 @@ def _bounds(found: Synchronisation, rho: float, radius: float, mismatch: float
         yield MismatchBound(float('inf'), float('inf'), 0.0, float(np.pi))
         return
     least, smallest = 0.0, float(found.weights.min())
-    largest = radius if found.overshoot == 0.0 else float(
-        np.sqrt(radius**2 + found.overshoot / rho))
+    largest = invariant_radius(radius, found.overshoot, rho)
     two, one = _farthest_two(found.weights), ((1.0 - smallest) / smallest) ** 0.5
     for _ in range(20):
         growth = min(found.growth, rho * (radius**2 - least**2))

@@ -210,6 +210,11 @@ def overshoot(laplacian: Array) -> float:
     return most if most > 1e-9 * (1.0 + float(np.abs(laplacian).max(initial=0.0))) else 0.0
 
 
+def invariant_radius(radius: float, overshot: float, rho: float) -> float:
+    """R of the disc |x| ≤ R that no oscillator leaves, from :func:`overshoot`."""
+    return radius if overshot == 0.0 else float(np.sqrt(radius**2 + overshot / rho))
+
+
 def slowest_rate(M: Array) -> float:
     """Smallest decay rate of u̇ = −M u for a matrix with no positive entry off its diagonal.
 

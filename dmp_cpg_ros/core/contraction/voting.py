@@ -72,8 +72,8 @@ def rest_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequen
     Returns
     -------
     float
-        Found by bisection on the equilibrium [1/s]: necessary for a stop, and tight; infinite when
-        no weight is enough.
+        Found by bisection on the equilibrium [1/s], rounded down to where there is none:
+        necessary for a stop, and tight; infinite when no weight is enough.
     """
     near: Array | None = None
 
@@ -86,7 +86,7 @@ def rest_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequen
         near = rest.state
         return bool(np.all(rest.distance[gains > 0.0] <= region_radius))
 
-    return _threshold(rests, _scale(system, omega, region_radius))
+    return _threshold(rests, _scale(system, omega, region_radius))[0]
 
 
 def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequence[int],
@@ -113,7 +113,7 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
         rate = capture_set(system, omega, gains, region_radius, known=box).rate
         return inhibited_contraction(system, replace(capture, rate=rate)).reach != NONE
 
-    return _threshold(certified, _scale(system, omega, region_radius))
+    return _threshold(certified, _scale(system, omega, region_radius))[1]
 
 
 def majority_clamp(system: CanonicalSystem, omega: float, region_radius: float,
@@ -214,14 +214,16 @@ def _scale(system: CanonicalSystem, omega: float | Array, region_radius: float) 
     return float(np.sum(omega * system.radius)) / region_radius + 1e-3
 
 
-def _threshold(works: Callable[[float], bool], scale: float) -> float:
-    """Smallest α at which something starts to work, searched from 1/30 to 1000 times a scale."""
+def _threshold(works: Callable[[float], bool], scale: float) -> tuple[float, float]:
+    """An α at which something does not work and one, ``_PRECISION`` higher, at which it does,
+    searched from 1/30 to 1000 times a scale.
+    """
     low, high = scale / 30.0, 3.0 * scale
     while not works(high):
         low, high = high, 3.0 * high
         if high > 1000.0 * scale:
-            return float('inf')
+            return np.inf, np.inf
     while high > low * (1.0 + _PRECISION):
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if works(middle) else (middle, high)
-    return high
+    return low, high

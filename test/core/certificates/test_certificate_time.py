@@ -13,11 +13,15 @@ from core_examples import TICK, network
 from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.network import Setting
+from dmp_cpg_ros.core.certificates.timing import time_to_places
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.entry import in_places
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.reference.stop_distance import slowing_time, stop_distance
+from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.core.voting.parameters import VotingParameters
 
@@ -116,6 +120,25 @@ def test_no_start_takes_longer_than_its_bound_and_stops_within_starts_keep_their
         for _ in range(delay):
             again.tick()
         assert again.until('at_rest', True, 2.0 * found.time_to_rest) <= found.time_to_rest
+
+
+@pytest.mark.parametrize('spread', [0.5, 0.8, 1.02, 1.5])
+@pytest.mark.parametrize('rho', [1.0, 8.0, 30.0])
+def test_free_legs_are_in_their_places_within_the_bound_from_inside_and_outside(
+        rho: float, spread: float) -> None:
+    free = network('amble', rho=rho)
+    radius, rng = free.parameters.radius, np.random.default_rng(round(10.0 * rho + spread))
+    setting = Setting.of(free, SuiteParameters(canonical=free.parameters), TICK)
+    for aside in (0.0, 0.02):
+        x = spread * free.locked_state() + aside * radius * rng.standard_normal((4, 2))
+        bound, dt, ticks = time_to_places(setting, x), 0.001, 0
+        none = Inhibition(False, np.zeros(4), 0.3)
+        while not in_places(free, x, 0.3) and ticks * dt <= bound:
+            x = free.step(x, np.zeros(3), none, dt)
+            ticks += 1
+        assert ticks * dt <= bound + dt
+        if aside == 0.0 and abs(spread - 1.0) > 0.1:
+            assert 0.0 < bound < 1.2 * ticks * dt + 0.03    # a bound, and not a platitude
 
 
 def test_the_bound_grows_with_the_distance_to_the_speed_of_capture() -> None:

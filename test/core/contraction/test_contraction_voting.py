@@ -15,6 +15,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.capture import capture_set, shared_capture
+from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
 from dmp_cpg_ros.core.contraction.voting import (
     certified_threshold,
@@ -45,6 +46,20 @@ def stopped(system: CanonicalSystem, alpha: float, voters: tuple[int, ...]) -> b
     acting = vote.acting_gains(x, system.target)
     still = np.abs(system.field(x, OMEGA, acting)).max() < 1e-2
     return bool(still and np.array_equal(acting, gains))
+
+
+@pytest.mark.parametrize('voters', [(0,), (0, 2)])
+def test_nothing_rests_at_the_threshold_itself(voters: tuple[int, ...]) -> None:
+    system = network('ring', 100.0)
+    threshold = rest_threshold(system, OMEGA, voters, REGION)
+
+    def rests(alpha: float) -> bool:
+        gains = np.zeros(4)
+        gains[list(voters)] = alpha
+        rest = inhibited_equilibrium(system, OMEGA, gains)
+        return bool(rest is not None and np.all(rest.distance[list(voters)] <= REGION))
+
+    assert not rests(threshold) and rests(1.001 * threshold)
 
 
 @pytest.mark.parametrize('name', ['all_to_all', 'ring'])
