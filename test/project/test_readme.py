@@ -32,6 +32,18 @@ for name in ('rclpy', 'mujoco', 'yaml'):
 """
 
 
+TYPED = """
+import code, sys
+sys.modules['rclpy'] = None
+console = code.InteractiveConsole()
+for block in {codes!r}:
+    for line in [*block.splitlines(), '']:
+        console.push(line)
+    print({mark!r}, end='')
+"""
+"""Types blocks line by line, as a reader does."""
+
+
 def tables_of_parameters() -> dict[str, Any]:
     """Parameters of every kind of node; needs ROS."""
     from dmp_cpg_ros.commands import reference
@@ -66,10 +78,10 @@ def test_the_tutorial_prints_what_it_shows(tmp_path: Path) -> None:
     codes, shown = blocks(document, 'python'), blocks(document, 'text')
     assert len(codes) == len(shown) == 5
     script, mark = tmp_path / 'tutorial.py', '-- next block --\n'
-    script.write_text("import sys\nsys.modules['rclpy'] = None\n" + ''.join(
-        f"{code}\nprint({mark!r}, end='')\n" for code in codes), encoding='utf-8')
+    script.write_text(TYPED.format(codes=codes, mark=mark), encoding='utf-8')
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True,
                           check=True, cwd=tmp_path, env={'PYTHONPATH': str(ROOT)})
+    assert done.stderr == ''
     assert done.stdout.split(mark)[:-1] == shown
 
 
