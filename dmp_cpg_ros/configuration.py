@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from difflib import get_close_matches
 from functools import lru_cache
@@ -30,6 +30,9 @@ _PACKAGE_FOLDER = Path(__file__).resolve().parent
 _IN_SHARE = Path('share', PACKAGE, 'config')
 _PARAMETERS_KEY = 'ros__parameters'
 
+ROBOTS, SCENARIOS, MOTIONS, POLICIES = 'robots', 'scenarios', 'motions', 'policies'
+"""Folders of ``config/`` for files of one kind."""
+
 LARGEST_FILE = 2**18
 """Longest file that is read [B]."""
 
@@ -40,7 +43,7 @@ DEEPEST = 32
 """Deepest nesting of mappings and lists."""
 
 
-def find_config(name: str | Path) -> Path:
+def find_config(name: str | Path, folder: str = '') -> Path:
     """Find a YAML file of the package by its name below ``config/``, or any file by its path.
 
     A path that exists is taken as it is. Otherwise the first of `config_folders` that has the
@@ -50,6 +53,9 @@ def find_config(name: str | Path) -> Path:
     ----------
     name : str or Path
         For example ``gaits.yaml``, ``robots/mini_quadruped`` or ``/home/me/my_robot.yaml``.
+    folder : str
+        Folder of the kind of file that is meant, such as ``ROBOTS``: there a name without a
+        folder of its own is looked for.
 
     Returns
     -------
@@ -61,16 +67,23 @@ def find_config(name: str | Path) -> Path:
     MissingFileError
         If there is no such file; the text lists the folders searched and the names that exist.
     """
-    if not isinstance(name, (str, Path)) or '\0' in str(name):
+    if not isinstance(name, (str, Path)) or '\0' in str(name) or name in ('', Path()):
         raise MissingFileError(f'{shown(name)} is no name of a file')
     given = Path(os.path.expanduser(name))
     if os.path.isfile(given):
         return given.absolute()
-    folders = [] if given.is_absolute() else config_folders()
-    for candidate in (folder / name for folder in folders for name in (given, f'{given}.yaml')):
+    places = [] if given.is_absolute() else config_folders()
+    meant = folder / given if given.parent == Path() else given
+    for candidate in (place / name for place in places for name in (meant, f'{meant}.yaml')):
         if os.path.isfile(candidate):
             return candidate
-    raise MissingFileError(_not_found(name, folders))
+    raise MissingFileError(_not_found(name, meant, places))
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """Question for an error whether a name that is near was meant; empty where none is."""
+    near = get_close_matches(name, list(valid), n=1)
+    return f'did you mean {near[0]}? ' if near else ''
 
 
 def config_folders() -> list[Path]:
@@ -305,19 +318,19 @@ for _kind, (_pattern, _) in _SCALARS.items():
         _Composer.add_implicit_resolver(_TAG + _kind, re.compile(f'(?:{_pattern})$'), None)
 
 
-def _not_found(name: str | Path, folders: list[Path]) -> str:
+def _not_found(name: str | Path, meant: Path, places: list[Path]) -> str:
     """Say what is there instead: the files of the folder that was meant, and near names."""
-    if not folders:
+    if not places:
         return f'file {str(name)!r} does not exist'
-    meant = Path(name).parent
-    exist = sorted({path.relative_to(folder) for folder in folders
-                    for path in folder.rglob('*.yaml')})
-    beside = [path.as_posix() for path in exist if path.parent == meant]
-    by_stem = {path.stem: path for path in exist if path.parent == meant or meant == Path('.')}
-    near = get_close_matches(Path(name).stem, by_stem, n=1)
-    guess = f'did you mean {by_stem[near[0]].with_suffix("").as_posix()}? ' if near else ''
-    return (f"file {str(name)!r} does not exist in the current folder nor in "
-            f"{', '.join(map(str, folders))}; {guess}there are {', '.join(beside) or 'no files'}")
+    exist = sorted({path.relative_to(place) for place in places for path in place.rglob('*.yaml')})
+    beside = [path.as_posix() for path in exist if path.parent == meant.parent]
+    by_stem = {path.stem: path.with_suffix('').as_posix() for path in exist
+               if meant.parent in (path.parent, Path())}
+    near = get_close_matches(meant.stem, by_stem, n=1)
+    guess = f'did you mean {by_stem[near[0]]}? ' if near else ''
+    told = f"; {guess}there are {', '.join(beside)}" if beside else ''
+    searched = ', '.join(str(place / meant.parent) for place in places)
+    return f'file {str(name)!r} does not exist in the current folder nor in {searched}{told}'
 
 
 def _sections(content: Mapping[str, Any], path: str | Path, prefix: str = ''

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
+from dmp_cpg_ros import configuration
 from dmp_cpg_ros.configuration import find_config, load_yaml, naming
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 from dmp_cpg_ros.core.parameters import check_names, shown
@@ -174,7 +175,7 @@ def load_motion(name: str) -> Motion | None:
     for offered in entry_points(group=MOTIONS, name=name):
         motion: Motion = offered.load()()
         return motion
-    path = find_config(name)
+    path = find_config(name, configuration.MOTIONS)
     with naming(path):
         primitive = load_primitive(path)
         if not isinstance(primitive, RhythmicPrimitive):
@@ -188,5 +189,6 @@ def motion_overrides(name: str) -> dict[str, Any]:
     motion = load_motion(name)
     if motion is None:
         return {}
-    known = name if Path(name).suffix == '' and not Path(name).exists() else find_config(name)
+    known = name if Path(name).suffix == '' and not Path(name).exists() else find_config(
+        name, configuration.MOTIONS)
     return {'motion': str(known), 'clearance': motion.clearance}

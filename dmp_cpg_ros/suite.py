@@ -10,11 +10,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dmp_cpg_ros.configuration import find_config, load_yaml, naming, node_parameters
+from dmp_cpg_ros.configuration import (
+    ROBOTS,
+    find_config,
+    load_yaml,
+    naming,
+    nearest,
+    node_parameters,
+)
 from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.parameters import shown
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.robot_model.grounds import World
 from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
@@ -37,6 +44,8 @@ class Suite:
         Parameters of the parts.
     gait : Gait
         The gait that is named.
+    gaits : KnownGaits
+        All gaits of the file that is named.
     robot : RobotParameters
         How the robot is run.
     sensors : SensorParameters
@@ -55,6 +64,7 @@ class Suite:
 
     parameters: core.SuiteParameters
     gait: Gait
+    gaits: KnownGaits
     robot: core.RobotParameters
     sensors: SensorParameters
     mismatch: MismatchParameters
@@ -91,10 +101,7 @@ def load_gaits(name: str | Path = 'gaits.yaml') -> dict[str, Gait]:
 
 def load_gait(name: str, file: str | Path = 'gaits.yaml') -> Gait:
     """Read one gait; raises ParameterError with the valid names when it is not there."""
-    gaits = load_gaits(file)
-    if not isinstance(name, str) or name not in gaits:
-        raise ParameterError(f"there is no gait {shown(name)}; valid are {', '.join(gaits)}")
-    return gaits[name]
+    return KnownGaits(load_gaits(file)).named(name)
 
 
 def load_suite(file: str | Path | None = None, overrides: Mapping[str, Any] | None = None,
@@ -117,16 +124,38 @@ def load_suite(file: str | Path | None = None, overrides: Mapping[str, Any] | No
     Raises
     ------
     DmpCpgError
-        If the file is not there, or a name or value in it is wrong; the text says where and what
-        is valid.
+        If the file is not there, or a name or value in it or in the overrides is wrong; the text
+        says where in the file, or neither file nor node where it is an override, and what is
+        valid.
     """
-    path, overrides = find_config(file or DEFAULT_FILE), dict(overrides or {})
+    path = find_config(DEFAULT_FILE if file is None else file)
+    overrides = dict(overrides or {})
     for name in overrides:
         if name not in SUITE_NAMES:
-            raise ParameterError(
-                f"there is no parameter '{name}'; valid are {', '.join(sorted(SUITE_NAMES))}")
-    with naming(path):
-        return _suite(path, overrides, namespace)
+            raise ParameterError(_unknown(name))
+    try:
+        with naming(path):
+            return _suite(path, overrides, namespace)
+    except DmpCpgError as error:
+        text, named = str(error), f"'{path}'"
+        if not overrides or not text.startswith(named) or text == _problem(path, namespace):
+            raise
+        # The file is right without the overrides.
+        raise type(error)(text.removeprefix(named).partition(': ')[2]) from error
+
+
+def _problem(path: Path, namespace: str) -> str:
+    """What is wrong in a parameter file itself; empty where nothing is."""
+    try:
+        load_suite(path, None, namespace)
+    except DmpCpgError as error:
+        return str(error)
+    return ''
+
+
+def _unknown(name: str) -> str:
+    return (f"there is no parameter '{name}'; {nearest(name, SUITE_NAMES)}valid are "
+            f'{", ".join(sorted(SUITE_NAMES))}')
 
 
 def _suite(path: Path, overrides: Mapping[str, Any], namespace: str) -> Suite:
@@ -139,11 +168,12 @@ def _suite(path: Path, overrides: Mapping[str, Any], namespace: str) -> Suite:
             {part: sets[node][part] for node, parts in core.PART_OF.items() for part in parts}),
         motion=load_motion(sets[LEG][LegParameters].motion))
     gait = canonical[core.GaitParameters]
+    gaits = KnownGaits(load_gaits(gait.gaits_file))
     world = core.chosen_world(robot[WorldParameters], robot[core.RobotParameters])
-    return Suite(parameters, load_gait(gait.gait, gait.gaits_file), robot[core.RobotParameters],
+    return Suite(parameters, gaits.named(gait.gait), gaits, robot[core.RobotParameters],
                  robot[SensorParameters], robot[MismatchParameters], world,
                  robot[core.TickParameters].tick_ns,
-                 find_config(robot[core.RobotFileParameters].robot), path)
+                 find_config(robot[core.RobotFileParameters].robot, ROBOTS), path)
 
 
 def node_sets(path: Path, kind: str, overrides: Mapping[str, Any] | None = None,
@@ -181,8 +211,7 @@ def node_sets(path: Path, kind: str, overrides: Mapping[str, Any] | None = None,
     content = load_yaml(path) if content is None else content
     given = {**node_parameters(content, node, path), **(overrides or {})}
     for unknown in given.keys() - SUITE_NAMES - NODE_NAMES:
-        raise ParameterError(f"'{path}', {node}: there is no parameter '{unknown}'; valid are "
-                             f'{", ".join(sorted(SUITE_NAMES))}')
+        raise ParameterError(f"'{path}', {node}: {_unknown(unknown)}")
     sets: dict[type[Any], Any] = {}
     for cls in KINDS[kind].sets:
         names = {field.name for field in dataclasses.fields(cls)}

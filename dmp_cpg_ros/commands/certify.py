@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.analysis.strict_json import to_json, write_json
-from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, given_file, run_command
+from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.core.certificates import inequality, proof, suggest, votes
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.inequality import Certificate
@@ -44,14 +44,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _certify(options: argparse.Namespace, ros: RosArguments) -> int:
-    if options.file and ros.parameters_file:
-        raise ParameterError('give FILE or --params-file, not both')
+    file = given_file(options.file, ros, 'FILE')
     overrides = dict(ros.parameters)
     if options.gait is not None:
         overrides['gait'] = options.gait
     if options.robot is not None:
-        overrides['robot'] = str(find_config(options.robot).resolve())
-    suite = load_suite(options.file or ros.parameters_file, overrides, ros.namespace)
+        overrides['robot'] = str(find_config(options.robot, ROBOTS).resolve())
+    suite = load_suite(file, overrides, ros.namespace)
     p, running = suite.parameters, running_parameters(suite)
     network = running['network']
     span = operating_range(network, p.inhibition, p.reference)

@@ -25,10 +25,11 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+from dmp_cpg_ros.commands.ros_arguments import positive
 from dmp_cpg_ros.commands.suite_client import SuiteClient, connected, prepared
 from dmp_cpg_ros.commands.view_commands import ViewCommands
 from dmp_cpg_ros.commands.view_server import Frames, ViewServer
-from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import state_at
@@ -125,7 +126,7 @@ class LiveView:
                 (core.INHIBITION, InhibitionParameters)))
         self._radius = canonical[CanonicalParameters].radius
         gaits = KnownGaits(load_gaits(canonical[core.GaitParameters].gaits_file))
-        file = find_config(robot[core.RobotFileParameters].robot)
+        file = find_config(robot[core.RobotFileParameters].robot, ROBOTS)
         self._joint_names = load_robot_file(file).joint_names
         self._scene = Scene(file, core.chosen_world(
             robot[WorldParameters], robot[core.RobotParameters]))
@@ -275,6 +276,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return OK
 
 
+def _port(text: str) -> int:
+    if not text.isdecimal() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"'{text}' is no port; valid are 1 to 65535, and 0 for "
+                                         'the first that is free')
+    return int(text)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='live_view',
@@ -283,9 +291,9 @@ def _parser() -> argparse.ArgumentParser:
         'works on this machine only; from another one: ssh -L 8642:127.0.0.1:8642 MACHINE.',
         epilog='Exit status: 0 after Ctrl-C, 1 when no suite is found, 2 for bad input.')
     parser.add_argument('--namespace', metavar='NAME', help="the suite's namespace")
-    parser.add_argument('--port', metavar='N', type=int, default=0,
+    parser.add_argument('--port', metavar='N', type=_port, default=0,
                         help='port of the page (default: the first that is free from 8642 on)')
-    parser.add_argument('--wait', metavar='SECONDS', type=float, default=60.0,
+    parser.add_argument('--wait', metavar='SECONDS', type=positive, default=60.0,
                         help='how long to look for the suite (default: 60)')
     return parser
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, given_file, run_command
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.filter import CommandGate
@@ -112,9 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _print(options: argparse.Namespace, ros: RosArguments) -> int:
-    if options.file and ros.parameters_file:
-        raise ParameterError('give FILE or --params-file, not both')
-    suite = load_suite(options.file or ros.parameters_file, ros.parameters, ros.namespace)
+    file = given_file(options.file, ros, 'FILE')
+    suite = load_suite(file, ros.parameters, ros.namespace)
     print(f'# Limits of {suite.gait.name}, {suite.robot_file.name}')
     print(yaml.safe_dump({node: {'ros__parameters': values}
                           for node, values in nav2_limits(suite).items()}, sort_keys=False,

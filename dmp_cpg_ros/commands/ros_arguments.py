@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -124,6 +125,25 @@ def parse_arguments(parser: argparse.ArgumentParser, arguments: Sequence[str] | 
     return options, read
 
 
+def number(text: str) -> float:
+    """Type of an argument: a finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is no number") from None
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f'{text} must be finite')
+    return value
+
+
+def positive(text: str) -> float:
+    """Type of an argument: a finite number above zero."""
+    value = number(text)
+    if value <= 0.0:
+        raise argparse.ArgumentTypeError(f'{text} must be positive')
+    return value
+
+
 def read_pair(text: str) -> tuple[str, str]:
     """Read ``NAME:=VALUE``; raises ParameterError when it is no such pair."""
     name, separator, value = text.partition(':=')
@@ -139,6 +159,13 @@ def read_parameter(text: str) -> tuple[str, Any]:
         raise ParameterError(f"'{text}' is for one node; values here hold for every node that has "
                              f'the parameter: {text.rpartition(":")[0].rpartition(":")[2]}:=...')
     return name, parse_yaml(value, f"'{name}'")
+
+
+def given_file(own: str | None, ros: RosArguments, option: str) -> str | None:
+    """Parameter file, of a command's own option or of ROS's; raises ParameterError for both."""
+    if own is not None and ros.parameters_file is not None:
+        raise ParameterError(f'give {option} or --params-file, not both')
+    return ros.parameters_file if own is None else own
 
 
 def checked_namespace(text: str) -> str:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from dmp_cpg_ros.analysis.context import RunContext, find_parameter
-from dmp_cpg_ros.configuration import find_config, first_free, load_yaml
+from dmp_cpg_ros.configuration import ROBOTS, find_config, first_free, load_yaml
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
@@ -173,7 +173,7 @@ def picture_taker(robot_path: Path | None, world: World | None = None) -> Draw:
 def _robot(name: Path | str | None) -> tuple[RobotDescription, Path | None]:
     from dmp_cpg_ros.robot.model_reader import load_description
 
-    path = None if name is None else find_config(name)
+    path = None if name is None else find_config(name, ROBOTS)
     return load_description(path), path
 
 

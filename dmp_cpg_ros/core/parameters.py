@@ -123,7 +123,8 @@ def _checked(field: dataclasses.Field[Any], value: Any) -> Any:
     if not isinstance(field.default, tuple):
         return _checked_scalar(field, field.default, value)
     if not isinstance(value, (tuple, list)):
-        raise ParameterError(f"parameter '{field.name}' must be a list, not {shown(value)}")
+        such = f', such as {typed((value,))}' if isinstance(value, type(field.default[0])) else ''
+        raise ParameterError(f"parameter '{field.name}' must be a list{such}, not {shown(value)}")
     return tuple(_checked_scalar(field, field.default[0], entry) for entry in value)
 
 

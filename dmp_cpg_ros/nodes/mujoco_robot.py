@@ -15,7 +15,7 @@ from typing import Any
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
-from dmp_cpg_ros.configuration import find_config, parse_yaml
+from dmp_cpg_ros.configuration import ROBOTS, find_config, parse_yaml
 from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.errors import DataError, ParameterError
@@ -347,7 +347,7 @@ class MujocoRobotNode(DrivenRobot):
 
     @property
     def _file(self) -> Path:
-        return find_config(self.parameters_of(core.RobotFileParameters).robot)
+        return find_config(self.parameters_of(core.RobotFileParameters).robot, ROBOTS)
 
     def _make_robot(self) -> Robot:
         p, file = self._options, self._file

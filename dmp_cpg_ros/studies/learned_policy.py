@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dmp_cpg_ros.configuration import find_config, load_yaml, naming
+from dmp_cpg_ros.configuration import POLICIES, find_config, load_yaml, naming
 from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.vec3 import rotation
@@ -123,7 +123,7 @@ def load_policy(path: str | Path, network: str | Path | None = None) -> PolicyFi
     DataError, ParameterError
         If it is no such description.
     """
-    path = find_config(path)
+    path = find_config(path, POLICIES)
     with naming(path):
         content = load_yaml(path)
         check_names(content, PolicyFile.__dataclass_fields__, _REQUIRED, f"policy '{path}'")

@@ -15,6 +15,8 @@ from checkout import PACKAGE, ROOT
 from dmp_cpg_ros.configuration import (
     DEEPEST,
     LARGEST_FILE,
+    MOTIONS,
+    ROBOTS,
     config_folders,
     find_config,
     load_yaml,
@@ -54,6 +56,22 @@ def test_a_missing_name_lists_the_places_and_the_names() -> None:
     with pytest.raises(MissingFileError, match='did you mean scenarios/start_stop') as error:
         find_config('scenarios/startstop')
     assert 'robots/' not in str(error.value)
+
+
+def test_a_name_of_a_kind_of_file_is_looked_for_among_those() -> None:
+    assert find_config('go2', ROBOTS) == find_config('robots/go2.yaml', ROBOTS)
+    with pytest.raises(MissingFileError, match='did you mean robots/go2') as error:
+        find_config('goo2', ROBOTS)
+    assert 'robots/mini_quadruped.yaml' in str(error.value)
+    assert 'suite.yaml' not in str(error.value)
+    with pytest.raises(MissingFileError, match='/config/motions$'):
+        find_config('my_walk.yaml', MOTIONS)
+
+
+@pytest.mark.parametrize('name', ['', Path()])
+def test_an_empty_name_is_refused(name: str | Path) -> None:
+    with pytest.raises(MissingFileError, match='is no name of a file'):
+        find_config(name)
 
 
 def test_a_missing_absolute_path_is_not_searched_elsewhere(tmp_path: Path) -> None:

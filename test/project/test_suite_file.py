@@ -60,3 +60,24 @@ def test_every_gait_makes_a_suite(gait: str) -> None:
 def test_wrong_values_are_named_with_what_is_valid(name: str, value: object, text: str) -> None:
     with pytest.raises(ParameterError, match=text):
         load_suite(overrides={name: value})
+
+
+@pytest.mark.parametrize(('overrides', 'text'), [
+    ({'gait': 'gallop'}, "there is no gait 'gallop'; valid are amble"),
+    ({'rho': -1.0}, "parameter 'rho' = -1.0"),
+    ({'control_rate': 333.0}, 'control_rate = 333 Hz'),
+    ({'inhibited_legs': 'auto'}, r"parameter 'inhibited_legs' must be a list, such as \[auto\], not"),
+    ({'gaitt': 'trot'}, r"there is no parameter 'gaitt'; did you mean gait\?"),
+])
+def test_an_override_that_is_wrong_is_not_blamed_on_the_file(
+        overrides: dict[str, object], text: str, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=f'^{text}'):
+        load_suite(overrides=overrides)
+    path = tmp_path / 'wrong.yaml'
+    path.write_text(FILE.read_text(encoding='utf-8').replace('rho: 8.0', 'rho: -8.0'), 'utf-8')
+    with pytest.raises(ParameterError, match=rf"^'{path}', /\w+: .* -8\.0 "):
+        load_suite(path, {'gait': 'trot'})
+
+
+def test_a_robot_is_found_by_its_name_alone() -> None:
+    assert load_suite(overrides={'robot': 'go2'}).robot_file == find_config('robots/go2.yaml')

@@ -16,6 +16,7 @@ from typing import NamedTuple
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce, GaitTransition
+from dmp_cpg_ros.core.parameters import shown
 
 
 class GaitShares(NamedTuple):
@@ -94,8 +95,9 @@ class KnownGaits:
 
     def named(self, name: str) -> Gait:
         """Gait of a name; raises ParameterError with the valid names."""
-        if name not in self.gaits:
-            raise ParameterError(f"there is no gait '{name}'; valid are {', '.join(self.gaits)}")
+        if not isinstance(name, str) or name not in self.gaits:
+            raise ParameterError(
+                f"there is no gait {shown(name)}; valid are {', '.join(self.gaits)}")
         return self.gaits[name]
 
     def _gait_of(self, shares: GaitShares) -> GaitInForce:

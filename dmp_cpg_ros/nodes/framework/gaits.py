@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def description_of(node: SuiteNode) -> RobotDescription:
     """Description of the robot that a node's parameters name."""
-    return load_description(find_config(node.parameters_of(RobotFileParameters).robot))
+    return load_description(find_config(node.parameters_of(RobotFileParameters).robot, ROBOTS))
 
 
 def known_gaits(node: SuiteNode) -> KnownGaits:

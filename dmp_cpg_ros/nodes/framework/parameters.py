@@ -19,9 +19,10 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from dmp_cpg_ros.configuration import load_yaml
+from dmp_cpg_ros.configuration import load_yaml, nearest
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.suite_parameters import OWNER
 from dmp_cpg_ros.nodes.messages.interfaces import published_by, read_by, served_by
 from dmp_cpg_ros.suite_table import KINDS, WALKING
 
@@ -108,7 +109,8 @@ class ParameterTable:
         for name in values:
             if name not in self.fields:
                 raise ParameterError(
-                    f"there is no parameter '{name}'; valid are {', '.join(sorted(self.fields))}")
+                    f"there is no parameter '{name}'; {nearest(name, self.fields)}valid are "
+                    f"{', '.join(sorted(self.fields))}")
         return {parameter_set: parameter_set(**{
             field.name: values.get(field.name, self.fields[field.name].default)
             for field in dataclasses.fields(parameter_set)}) for parameter_set in self.sets}
@@ -240,7 +242,8 @@ def help_text(node_class: type[SuiteNode]) -> str:
     table, lines = node_class.parameter_table(), ['parameters:']
     for name, field in table.fields.items():
         notes = (f'default {as_yaml(plain(field.default))}', constraint(field),
-                 'changeable' if name in table.changeable else '')
+                 '' if name not in table.changeable else 'changeable'
+                 if OWNER.get(name, kind) == kind else f'follows {OWNER[name]}')
         lines += [f'  {name}: {describe(field)}', f"      {', '.join(filter(None, notes))}"]
     return '\n\n'.join([*parts, '\n'.join(lines)])
 
