@@ -26,10 +26,11 @@ ENDED_WITHIN_S = 15.0
 
 def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: Path, say: Say,
               server: ForkServer, *, lock_step: bool, processes: str, view: bool = False,
-              visualization: bool = False, respawn: bool = False) -> str:
+              visualization: bool = False, respawn: bool = False) -> list[str]:
     """Run the suite from nothing to nothing.
 
-    A walk goes on without its recorder, which says at once when it cannot write any more.
+    A walk goes on without its recorder, which says at once when it cannot write any more, and
+    without a change that is refused.
 
     Parameters
     ----------
@@ -59,8 +60,9 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
 
     Returns
     -------
-    str
-        How the recorder ended before its time; empty where it did not.
+    list of str
+        What went wrong all the same: how the recorder ended before its time, how many events of
+        the scenario were refused.
 
     Raises
     ------
@@ -107,7 +109,9 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
                 say(math.nan, f'had to kill {", ".join(killed)}')
         if killed:
             raise SuiteError(f'{", ".join(killed)} hung: no answer at the end of the run')
-    return watch.unrecorded
+    wrong = {f'{watch.unrecorded}; the rest of the walk was not recorded': watch.unrecorded,
+             f'{player.refused} of {len(scenario.events)} events were refused': player.refused}
+    return [told for told, so in wrong.items() if so]
 
 
 def _start(group: ProcessGroup, shared: Mapping[str, Sequence[str]], arguments: Sequence[str]

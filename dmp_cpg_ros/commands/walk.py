@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any
 from dmp_cpg_ros.commands import ros_arguments, run_folder
 from dmp_cpg_ros.commands.certify import running_parameters
 from dmp_cpg_ros.configuration import (
+    ROBOTS,
+    SCENARIOS,
     config_folders,
     find_config,
     load_yaml,
@@ -90,23 +92,29 @@ def _main(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> int:
 def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _Plan:
     """Read everything; raises DmpCpgError for what cannot be run."""
     default = 'stand_by' if options.view else 'start_stop'
-    scenario = load_scenario(options.scenario or f'scenarios/{default}.yaml')
+    named = default if options.scenario is None else options.scenario
+    scenario = load_scenario(named)
     if options.view and options.scenario is None:
         scenario = replace(scenario, duration_s=VIEWED_S)
     overrides = {**scenario.parameters, **motion_overrides(options.motion or ''),
                  **ros.parameters, **dict(map(ros_arguments.read_parameter, options.set))}
-    if options.parameters and ros.parameters_file:
-        raise ParameterError('give --parameters or --params-file, not both')
     if options.robot is not None:
-        overrides['robot'] = str(_found(options.robot, 'robots').resolve())
+        overrides['robot'] = str(find_config(options.robot, ROBOTS).resolve())
     if options.rate is not None:
         overrides['control_rate'] = options.rate
-    file = options.parameters or ros.parameters_file
+    file = ros_arguments.given_file(options.parameters, ros, '--parameters')
     if scenario.parameters:
-        with naming(options.scenario):
+        load_suite(file, None, ros.namespace)  # what is wrong in it is not the scenario's
+        with naming(find_config(named, SCENARIOS)):
             load_suite(file, scenario.parameters, ros.namespace)
     suite = load_suite(file, overrides, ros.namespace)
     events = {event.kind for event in scenario.events}
+    for event in scenario.events:
+        changes = {'gait': event.value} if event.kind == 'gait' else (
+            event.value if event.kind == 'set' else {})
+        if 'gait' in changes:
+            with naming(f'{named}, event at {event.at:g} s'):
+                suite.gaits.named(changes['gait'])
     if 'push' in events and suite.robot.physics != 'mujoco':
         raise ParameterError(f'pushes need physics: mujoco, not {suite.robot.physics}')
     if 'fail' in events and not suite.robot.failures_allowed:
@@ -142,7 +150,7 @@ def _walk(plan: _Plan, server: ForkServer) -> int:
           f'grade; at rest at most {plan.certificate.time_to_rest:.3f} s after a request',
           flush=True)
     made = 'metrics' if options.no_report else 'report'
-    status = _run(plan, folder, server)
+    status, wrong = _run(plan, folder, server)
     try:
         if (folder / 'bag').is_dir():
             if status > INTERRUPTED:
@@ -153,6 +161,8 @@ def _walk(plan: _Plan, server: ForkServer) -> int:
     except KeyboardInterrupt:
         print(f'walk: {made} skipped; to make the {made}: analyze {folder}', file=sys.stderr)
         status = INTERRUPTED + signal.SIGINT
+    for told in wrong:
+        print(f'walk: {told}', file=sys.stderr)
     print(f'{folder.name}: {time.monotonic() - begin:.0f} s in all')
     return status
 
@@ -171,7 +181,7 @@ def load_scenario(name: str | Path) -> Scenario:
         If it is not there or cannot be used.
     """
     try:
-        path = _found(name, 'scenarios')
+        path = find_config(name, SCENARIOS)
     except MissingFileError as error:
         robots = {path.stem for folder in config_folders()
                   for path in (folder / 'robots').glob('*.yaml')}
@@ -180,15 +190,10 @@ def load_scenario(name: str | Path) -> Scenario:
     return Scenario.from_mapping(load_yaml(path), f"'{path}'")
 
 
-def _found(name: str | Path, folder: str) -> Path:
-    """Find a file by its path, in the config folder, or by its name alone in a folder of that."""
-    known = Path(name)
-    bare = not known.is_file() and known.parent == Path('.')
-    return find_config(Path(folder) / known if bare else known)
-
-
-def _run(plan: _Plan, folder: Path, server: ForkServer) -> int:
-    """Bring the suite up, play, bring it down; returns the exit status."""
+def _run(plan: _Plan, folder: Path, server: ForkServer) -> tuple[int, list[str]]:
+    """Bring the suite up, play, bring it down; returns the exit status and what went wrong while
+    it walked on.
+    """
     from dmp_cpg_ros.commands.ending_signals import InterruptedRunError
     from dmp_cpg_ros.commands.suite_run import run_suite
 
@@ -203,19 +208,17 @@ def _run(plan: _Plan, folder: Path, server: ForkServer) -> int:
     arguments = ['--ros-args', '--params-file', str(file), *ros.others,
                  *(word for name, to in rules for word in ('-r', f'{name}:={to}'))]
     try:
-        unrecorded = run_suite(
+        wrong = run_suite(
             plan.scenario, plan.suite.tick_ns, arguments, folder / 'logs', _say, server,
             lock_step=options.lock_step, processes=options.processes,
             view=options.view, visualization=options.visualization, respawn=options.respawn)
-        if unrecorded:
-            print(f'walk: {unrecorded}; the rest of the walk was not recorded', file=sys.stderr)
-        return FAILED if unrecorded else OK
+        return FAILED if wrong else OK, wrong
     except InterruptedRunError as error:
         print(f'walk: {error}; the recording up to here is complete', file=sys.stderr)
-        return INTERRUPTED + error.signal
+        return INTERRUPTED + error.signal, []
     except DmpCpgError as error:
         print(f'walk: {error}; see {folder / "logs"}', file=sys.stderr)
-        return FAILED
+        return FAILED, []
 
 
 def _analyze(plan: _Plan, folder: Path) -> int:
@@ -263,8 +266,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='walk',
         description='Bring the suite up, play a scenario, record, report, shut everything down.',
-        epilog='Exit status: 0 when all went well, 1 when the robot fell or a node died, 2 for '
-        'bad input or where a suite is running already, 130 for Ctrl-C. '
+        epilog='Exit status: 0 when all went well, 1 when the robot fell, a node died or an event '
+        'was refused, 2 for bad input or where a suite is running already, 130 for Ctrl-C. '
         f'Scenarios: {", ".join(sorted(scenarios))}.')
     add = parser.add_argument
     add('scenario', nargs='?',

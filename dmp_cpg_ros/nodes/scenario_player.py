@@ -86,6 +86,8 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         Whether the scenario plays.
     busy : bool
         Whether an action is being delivered.
+    refused : int
+        How many changes of parameters and gaits were refused; the robot walks on without them.
     """
 
     def __init__(self, scenario: Scenario, tick_ns: int, lock_step: bool,
@@ -98,7 +100,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self.begun, self.busy, self._word = False, False, ''
         self._holding_ns, self._inhibition_ns = -1, -1
         self.time_ns, self.mode, self.drive, self.finished = 0, '', DRIVE_MODES[0], Future()
-        self._until_ns, self._again_ns = -1, 0
+        self._until_ns, self._again_ns, self.refused = -1, 0, 0
         self._lain: Future | None = None
         self.heard = OwnMessages(self, self._warn, lock_step=lock_step)
         voting = any(action.kind == 'votes' for action in self._actions)
@@ -313,6 +315,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         """Ask the owner for a change; the robot walks on when it is refused."""
 
         def done(refusal: str) -> None:
+            self.refused += bool(refusal)
             self._say(self.time_ns * 1e-9, f'  refused: {refusal}' if refusal else '  accepted')
             self._delivered()
 

@@ -301,6 +301,21 @@ def test_walk_refuses_what_is_wrong_and_says_what_is_valid(
     assert 'Traceback' not in process.output
 
 
+def test_walk_names_the_file_that_is_wrong(processes: Processes, tmp_path: Path) -> None:
+    gallop, wrong = tmp_path / 'gallop.yaml', tmp_path / 'wrong.yaml'
+    gallop.write_text(SCENARIO.format(duration=1.0) + '  - {at: 0.2, gait: gallop}\n', 'utf-8')
+    wrong.write_text(find_config('suite.yaml').read_text('utf-8').replace(
+        'rho: 8.0', 'rho: -8.0'), 'utf-8')
+    for arguments, text in (
+            ([str(gallop)], f"'{gallop}, event at 0.2 s': there is no gait 'gallop'; valid are"),
+            (['--parameters', str(wrong)], f"walk: '{wrong}', /reference_filter: parameter 'rho'"),
+            (['--set', 'rho:=-8.0'], "walk: parameter 'rho' = -8.0"),
+            ([''], "'' is no name of a file")):
+        process = walk(processes, *arguments)
+        assert process.wait() == 2, str(process)
+        assert text in process.output, process
+
+
 def test_help_of_walk_lists_the_scenarios(processes: Processes) -> None:
     process = processes.python('-m', 'dmp_cpg_ros', 'walk', '--help')
     assert process.wait() == 0
