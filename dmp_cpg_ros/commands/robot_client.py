@@ -19,6 +19,7 @@ from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.parameter import Parameter, get_parameter_value, parameter_value_to_python
 from std_srvs.srv import SetBool, Trigger
 
+from dmp_cpg_ros.commands.ros_arguments import number, positive
 from dmp_cpg_ros.commands.suite_client import (
     ClientError,
     SuiteClient,
@@ -174,21 +175,6 @@ def _as_mapping(value: Any) -> Any:
             (value.tolist() if hasattr(value, 'tolist') else value)]
 
 
-def _number(text: str) -> float:
-    """A finite number of the command line."""
-    value = float(text)
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f'{text} must be finite')
-    return value
-
-
-def _positive(text: str) -> float:
-    value = _number(text)
-    if value <= 0.0:
-        raise argparse.ArgumentTypeError(f'{text} must be positive')
-    return value
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='robot_client',
@@ -197,7 +183,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog='Exit status: 0 when it was done, 1 when no suite is found or it refuses, 2 '
         'for bad input, 130 for Ctrl-C before it was done.')
     parser.add_argument('--namespace', metavar='NAME', help="the suite's namespace")
-    parser.add_argument('--wait', metavar='SECONDS', type=_positive, default=10.0,
+    parser.add_argument('--wait', metavar='SECONDS', type=positive, default=10.0,
                         help='how long to look for the suite (default: 10)')
     commands = parser.add_subparsers(metavar='COMMAND', dest='command', required=True)
 
@@ -207,17 +193,17 @@ def _parser() -> argparse.ArgumentParser:
         return added
 
     def sending(added: argparse.ArgumentParser, rate_hz: float = 10.0) -> None:
-        added.add_argument('--rate', metavar='HZ', type=_positive, default=rate_hz,
+        added.add_argument('--rate', metavar='HZ', type=positive, default=rate_hz,
                            help=f'commands per second (default: {rate_hz:g})')
         added.add_argument('--stamped', action='store_true',
                            help='send TwistStamped, for a suite with stamped_cmd_vel:=true')
 
     velocity = command('cmd_vel', publish_command, 'command a velocity until Ctrl-C')
-    velocity.add_argument('v_x', type=_number, help='forward [m/s]')
+    velocity.add_argument('v_x', type=number, help='forward [m/s]')
     for name, unit in (('v_y', 'm/s'), ('yaw_rate', 'rad/s')):
-        velocity.add_argument(name, type=_number, help=f'to the left [{unit}]', default=0.0,
-                              nargs='?')
-    velocity.add_argument('--for', metavar='SECONDS', dest='seconds', type=_positive,
+        velocity.add_argument(name, type=number, help=f'to the left [{unit}] (default: 0)',
+                              default=0.0, nargs='?')
+    velocity.add_argument('--for', metavar='SECONDS', dest='seconds', type=positive,
                           default=math.inf, help='end after so long')
     sending(velocity)
     command('inhibit', request, 'stop the gait')
@@ -225,23 +211,24 @@ def _parser() -> argparse.ArgumentParser:
     for name in REQUESTS:
         command(name, request, interface(name).meaning)
     pushing = command('push', push, 'push the simulated robot for 0.1 s')
-    pushing.add_argument('force', metavar='F', type=_number, nargs=3,
+    pushing.add_argument('force', metavar='F', type=number, nargs=3,
                          help='forward, to the left, up [N]')
     parameters = command('param', parameter, 'get, set or list parameters of a node')
-    parameters.add_argument('action', choices=('get', 'set', 'list'))
-    parameters.add_argument('node', metavar='NODE')
-    for name in ('name', 'value'):
-        parameters.add_argument(name, metavar=name.upper(), nargs='?')
+    parameters.add_argument('action', choices=('get', 'set', 'list'),
+                            help='list takes NODE, get NODE NAME, set NODE NAME VALUE')
+    parameters.add_argument('node', metavar='NODE', help='such as inhibition; nodes lists them')
+    for name, text in (('name', 'parameter'), ('value', 'in YAML, such as trot, 0.5 or [fl, rr]')):
+        parameters.add_argument(name, metavar=name.upper(), nargs='?', help=text)
     command('nodes', show_nodes, 'list the nodes and what they wait for')
     printing = command('echo', echo, 'print what is published on a topic')
-    printing.add_argument('topic', metavar='TOPIC')
+    printing.add_argument('topic', metavar='TOPIC', help='such as inhibition_state')
     printing.add_argument('--once', action='store_true', help='end after the first message')
     sending(command('teleop', drive, 'drive by keyboard'))
     steering = command('joystick', steer, 'drive by joystick')
     steering.add_argument('device', metavar='DEVICE', nargs='?', default='/dev/input/js0',
                           help='of Linux (default: /dev/input/js0)')
     for name, default, unit in (('--top', 0.5, 'm/s'), ('--turn', 0.8, 'rad/s')):
-        steering.add_argument(name, metavar='MOST', type=_positive, default=default,
+        steering.add_argument(name, metavar='MOST', type=positive, default=default,
                               help=f'with the stick all the way [{unit}] (default: {default:g})')
     steering.add_argument('--axes', metavar='N', type=int, nargs=3, default=AXES,
                           help='that go forward, to the left and around (default: 1 0 3)')

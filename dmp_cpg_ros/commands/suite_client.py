@@ -24,7 +24,8 @@ from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
 
-from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.commands.ros_arguments import checked_namespace
+from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 from dmp_cpg_ros.nodes.messages.commands import twist
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, Interface, interface
@@ -158,7 +159,11 @@ def prepared(parser: argparse.ArgumentParser, arguments: Sequence[str] | None
     words = list(sys.argv[1:] if arguments is None else arguments)
     options = parser.parse_args(remove_ros_args(words))
     if options.namespace is not None:
-        words += ['--ros-args', '-r', f'__ns:=/{options.namespace.strip("/")}']
+        try:
+            namespace = checked_namespace(options.namespace)
+        except ParameterError as error:
+            parser.error(str(error))
+        words += ['--ros-args', '-r', f'__ns:={namespace or "/"}']
     prepare_middleware()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)

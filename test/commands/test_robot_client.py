@@ -15,7 +15,7 @@ import subprocess
 import sys
 import termios
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -27,6 +27,7 @@ import ros_processes
 import yaml
 from ros_processes import NodeProcess, Processes, Ros, composed_suite, reserved_domain, wait_until
 
+from dmp_cpg_ros.commands import live_view, robot_client
 from dmp_cpg_ros.commands.joystick import AXIS, BUTTON, EVENT, FULL, INITIAL
 from dmp_cpg_ros.commands.teleop import AXES, HELD
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -215,6 +216,23 @@ def test_a_message_is_printed_as_yaml(suite: Processes) -> None:
 def test_what_is_not_finite_is_bad_input(suite: Processes) -> None:
     assert 'finite' in refused(suite, 'cmd_vel', 'nan', status=2)
     assert 'finite' in refused(suite, 'push', '0', 'inf', '0', status=2)
+
+
+@pytest.mark.parametrize(('main', 'arguments', 'text'), [
+    (robot_client.main, ['cmd_vel', 'fast'], "'fast' is no number"),
+    (robot_client.main, ['--namespace', '9x y', 'nodes'], "'9x y' is no namespace"),
+    (live_view.main, ['--namespace', '9x y'], "'9x y' is no namespace"),
+    (live_view.main, ['--port', '99999'], "'99999' is no port"),
+    (live_view.main, ['--port', '-1'], "'-1' is no port"),
+    (live_view.main, ['--wait', 'nan'], 'nan must be finite'),
+])
+def test_bad_arguments_are_refused_in_plain_words(
+        main: Callable[[list[str]], int], arguments: list[str], text: str,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+    assert text in capsys.readouterr().err
 
 
 class Terminal:
