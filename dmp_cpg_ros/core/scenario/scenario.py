@@ -104,9 +104,12 @@ def known(values: Any, valid: tuple[str, ...], where: str) -> None:
 
 
 def _command(value: Any, where: str) -> tuple[Command | None, str]:
-    """Read a velocity, or None for silence."""
+    """Read a velocity, such as ``{v_x: 0.5, v_y: 0.0, gamma: 0.0}``, or ``silence``."""
     if value == 'silence':
         return None, 'silence'
+    if not isinstance(value, Mapping):
+        raise DataError(f'{where}: command must be silence, or a mapping with v_x, v_y, gamma, '
+                        f'not {value!r}')
     known(value, ('v_x', 'v_y', 'gamma'), where)
     v_x, v_y, gamma = numbers((value.get(key, 0.0) for key in ('v_x', 'v_y', 'gamma')), where,
                               f'command {value}', -100.0, 100.0)
@@ -137,7 +140,9 @@ def _votes(value: Any, where: str) -> tuple[dict[str, float], str]:
 
 
 def _push(value: Any, where: str) -> tuple[Push, str]:
-    """Read a push, such as ``{impulse: [0, 5, 0], duration: 0.1, frame: odom}``."""
+    """Read a push, such as ``{impulse: [0, 5, 0], duration: 0.1, frame: base_footprint}``, or in
+    the frame odom or world.
+    """
     known(value, ('impulse', 'duration', 'frame'), f'{where}: push')
     impulse = value.get('impulse')
     if not isinstance(impulse, (list, tuple)) or len(impulse) != 3:
@@ -263,10 +268,13 @@ class Scenario:
             raise DataError(f'{where}: duration = {duration} s must be positive and at most a day')
         events = tuple(Event.from_mapping(entry, f'{where}, event {place + 1}')
                        for place, entry in enumerate(entries))
-        times = [event.at for event in events]
-        if times != sorted(times) or (times and times[-1] > duration):
-            raise DataError(
-                f'{where}: the times of the events must increase and lie within the duration')
+        before = 0.0
+        for place, event in enumerate(events):
+            if not before <= event.at <= duration:
+                raise DataError(
+                    f'{where}, event {place + 1}: at = {event.at:g} s must not be before the '
+                    f'event above it, nor after the duration: {before:g} to {duration:g} s')
+            before = event.at
         return cls(str(values.get('name', 'scenario')), duration, events,
                    {**world_overrides(values.get('world'), where), **parameters})
 

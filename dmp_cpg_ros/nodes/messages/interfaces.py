@@ -191,7 +191,7 @@ TOPICS: tuple[Interface, ...] = (
               ('user',), (INHIBITION,), sometimes=(INHIBITION,)),
     Interface('push', WrenchStamped,
               'force on the base from its stamp on, for 0.1 s unless the next one comes before; '
-              'frame base_footprint (along the heading) or world', ('user',), (ROBOT,)),
+              'frame base_footprint (along the heading), odom or world', ('user',), (ROBOT,)),
     Interface('imu', Imu, 'turn rate and specific force in base_link; no orientation',
               (ROBOT,), (POSTURE, INHIBITION), sometimes=(POSTURE, INHIBITION)),
     Interface('ground_truth', Odometry, 'true pose and twist of base_link in world',

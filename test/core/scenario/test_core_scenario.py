@@ -74,9 +74,17 @@ def test_the_scenarios_of_the_package_can_be_played(file: Path) -> None:
     ({'at': 1.0, 'gait': 3}, 'name of a gait'),
     ({'at': 1.0, 'inhibit': 'yes'}, 'true or false'),
     ({'at': 1.0, 'command': {'v_z': 1.0}}, "'v_z' is not known"),
+    ({'at': 1.0, 'command': None}, 'must be silence, or a mapping with v_x, v_y, gamma, not None'),
     ({'at': 1.0, 'command': {'v_x': float('nan')}}, 'finite'),
-    ({'at': 3.0, 'gait': 'trot'}, 'within the duration'),
+    ({'at': 3.0, 'gait': 'trot'}, 'event 1: at = 3 s must not be .* the duration: 0 to 2 s'),
 ])
 def test_bad_events_are_refused_with_what_is_valid(event: dict[str, Any], text: str) -> None:
     with pytest.raises(DataError, match=text):
         scenario(event)
+
+
+def test_an_event_that_comes_too_late_in_the_list_is_named() -> None:
+    once = {'at': 1.0, 'gait': 'trot'}
+    assert len(scenario(once, once).events) == 2
+    with pytest.raises(DataError, match='event 3: at = 0.5 s .*: 1 to 2 s'):
+        scenario(once, once, {'at': 0.5, 'inhibit': True})
