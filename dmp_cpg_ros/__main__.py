@@ -16,6 +16,8 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
+from dmp_cpg_ros import __version__
+
 PACKAGE = 'dmp_cpg_ros'
 
 COMMANDS = ('walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client',
@@ -44,12 +46,15 @@ WITHOUT_ROS = ("{} needs ROS 2 Jazzy, which this Python ({}) does not find: sour
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``dmp_cpg_ros [NAME ...]``; returns the exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if given == ['--version']:
+        print(f'{PACKAGE} {__version__}')
+        return 0
     if given and not given[0].startswith('-'):
         sys.argv = given
         return run(given[0])
     from dmp_cpg_ros.suite_table import KINDS
 
-    print('usage: dmp_cpg_ros NAME [...], or NAME [...] alone; NAME --help says more')
+    print('usage: dmp_cpg_ros NAME [...], or NAME [...] alone; NAME --help says more; --version')
     for title, names in (('commands', COMMANDS), ('studies', STUDIES), ('nodes', tuple(KINDS))):
         print(f'\n{title}:')
         for name in names:

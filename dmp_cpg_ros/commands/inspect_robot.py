@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.model_reader import Inspection, inspect_model
 from dmp_cpg_ros.robot.robot_file import find_model
@@ -32,6 +33,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _inspect(options: argparse.Namespace, _: RosArguments) -> int:
+    if Path(options.model).suffix in ('.yaml', '.yml'):
+        raise ParameterError(f"'{options.model}' is YAML; inspect_robot reads MJCF (.xml), and "
+                             'writes the robot file (.yaml)')
     found = inspect_model(find_model(options.model, Path.cwd()))
     asked = options.model if '://' in options.model else None
     if options.output is None:

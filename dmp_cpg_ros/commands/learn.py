@@ -64,9 +64,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add('--start', metavar='S', type=float, help='take samples from here on, after the first [s]')
     add('--end', metavar='S', type=float, help='take samples up to here, after the first [s]')
     add('--positions-only', action='store_true', help='leave recorded derivatives aside')
-    add('--method', choices=METHODS, default=METHODS[0], help=f'default: {METHODS[0]}')
-    add('--ridge', type=float, default=FitOptions.ridge, help='relative (default: %(default)g)')
-    add('--overlap', type=float, help='value of a basis at the centre of its neighbour')
+    add('--method', choices=METHODS, default=METHODS[0], help='what is fitted: '
+        'response, the movement that the weights cause (default); joint, the force that it needs, '
+        'all bases at once; local, the same force, each basis by itself')
+    add('--ridge', type=float, default=FitOptions.ridge, metavar='R',
+        help='regularisation of the weights, relative to the mean square of their regressors '
+        '(default: %(default)g)')
+    add('--overlap', type=float, metavar='SHARE', help='value of a basis at the centre of its '
+        'neighbour, between 0 and 1 (default: suits kind and method)')
     add('--stiffness', metavar='K', type=float, help='[1/s^2] (default: suits the duration)')
     add('--damping', metavar='B', type=float, help='[1/s] (default: critical)')
     add('--form', choices=FORMS, default=FORMS[0], help='reading of tau (default: scaled)')

@@ -40,7 +40,7 @@ def parser_of(name: str, description: str | None, written: str, *, jobs: bool = 
     """Parser with the options ``--json``, for what is written, and those of
     :class:`~dmp_cpg_ros.studies.workers.Workers`.
     """
-    parser = argparse.ArgumentParser(prog=name, description=description,
+    parser = argparse.ArgumentParser(prog=name, description=(description or '').replace('``', ''),
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     if jobs:
         parser.add_argument('--workers', '--jobs', type=at_least_one,

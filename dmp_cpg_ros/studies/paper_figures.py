@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws the paper's figures from simulations: oscillators by themselves, and the walking robot.
 
-Figures 5 and 7 are those of the report, in :mod:`~dmp_cpg_ros.analysis.figures.gait`.
+Figures 5 and 7 are those of the report.
 """
 
 from __future__ import annotations

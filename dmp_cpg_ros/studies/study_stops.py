@@ -9,8 +9,7 @@ be used.
 The robot walks once for all request phases of a gait and speed; every case goes on from a copy of
 robot and loop at its phase, and so gives the same numbers as a run of its own.
 
-Two simple ways to stop, which freeze the phases, are compared with sparse inhibition
-(:mod:`~dmp_cpg_ros.studies.freezing_loop`).
+Two simple ways to stop, which freeze the phases, are compared with sparse inhibition.
 """
 
 from __future__ import annotations

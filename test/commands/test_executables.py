@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,9 @@ from rcl_interfaces.srv import GetParameters
 from ros_processes import Processes, Ros
 from std_srvs.srv import SetBool
 
-from dmp_cpg_ros.__main__ import COMMANDS, STUDIES
+from dmp_cpg_ros import __version__
+from dmp_cpg_ros.__main__ import COMMANDS, STUDIES, main
+from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
 from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, published_by, read_by
 from dmp_cpg_ros.suite_table import KINDS
 
@@ -46,6 +49,15 @@ def test_help_names_what_there_is(processes: Processes, name: str) -> None:
     if name in KINDS and name != 'bag_recorder':
         for topic in (*published_by(name), *read_by(name)):
             assert topic.name in process.output
+        owned = re.findall(r'^  (\w+): .*\n.*, changeable$', process.output, re.MULTILINE)
+        assert set(owned) & set(OWNER) == set(CHANGEABLE.get(name, ()))
+    if name in STUDIES:
+        assert not re.search('``|:`', process.output), process
+
+
+def test_the_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['--version']) == 0
+    assert capsys.readouterr().out == f'dmp_cpg_ros {__version__}\n'
 
 
 @pytest.mark.parametrize('name', KINDS)

@@ -119,7 +119,7 @@ def test_a_robot_that_is_fixed_to_the_world_is_refused(tmp_path, capsys):
 
 @pytest.mark.parametrize(('arguments', 'text'), [
     (['no_such.xml'], "'no_such.xml' was not found"),
-    ([str(ROBOTS / 'go2.yaml')], 'cannot be compiled'),
+    ([str(ROBOTS / 'go2.yaml')], 'reads MJCF (.xml)'),
     ([str(own_robot_file().model), '--output', '/no_such_folder/robot.yaml'], 'cannot write'),
 ])
 def test_bad_arguments_end_with_status_two_and_the_reason(arguments, text, capsys):
