@@ -27,8 +27,11 @@ DISTRIBUTION, PREFIX, PYTHON = 'jazzy', 'opt/ros/jazzy', 'python3.12'
 """Of ROS 2 on Ubuntu 24.04."""
 
 FROM_INDEX = {'python3-mujoco-pip': ('mujoco',), 'python3-rosbags-pip': ('rosbags',),
-              'mcap-ros2-support': ('mcap', 'lz4', 'zstandard')}
-"""rosdep keys that only the Python package index serves, and what is used of them."""
+              'mcap-ros2-support': ('mcap',)}
+"""rosdep keys that only the Python package index serves, and what Debian has not of them."""
+
+OF_DEBIAN = ('python3-lz4', 'python3-zstandard')
+"""What the last of them brings, and Debian has too."""
 
 SCRIPT = """\
 #!/usr/bin/{python}
@@ -41,9 +44,9 @@ sys.exit({function}())
 def dependencies(manifest: ElementTree.Element) -> list[str]:
     """Debian packages of the ``exec_depend`` of a package.xml, less those that are none."""
     keys = [entry.text or '' for entry in manifest.findall('exec_depend')]
-    return sorted(key if key.startswith('python3-') else
-                  f'ros-{DISTRIBUTION}-{key.replace("_", "-")}'
-                  for key in keys if key not in FROM_INDEX)
+    return sorted([*OF_DEBIAN, *(key if key.startswith('python3-') else
+                                 f'ros-{DISTRIBUTION}-{key.replace("_", "-")}'
+                                 for key in keys if key not in FROM_INDEX)])
 
 
 def control(manifest: ElementTree.Element) -> str:

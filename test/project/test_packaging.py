@@ -160,7 +160,10 @@ def test_everything_imported_is_declared_and_everything_declared_is_imported() -
     imported -= {PACKAGE, *sys.stdlib_module_names, *OPTIONAL}
     from_index = {name for _, name in DEPENDENCIES.values()}
     from_ros = set(texts('exec_depend')) - {key for key, _ in DEPENDENCIES.values()}
-    assert imported == from_index | from_ros - {'ros2launch', 'robot_state_publisher'}
+    launched = {name.split('.')[0] for path in (ROOT / 'launch').glob('*.py')
+                for name in imports(path.stem, path)} - {PACKAGE, *sys.stdlib_module_names}
+    assert imported | launched == (
+        from_index | from_ros - {'ros2launch', 'robot_state_publisher'})
 
 
 # --- executables ----------------------------------------------------------------------------
@@ -247,10 +250,12 @@ def test_a_debian_package_has_the_files_of_the_wheel_and_asks_for_what_debian_ha
         ['dpkg-deb', '--field', str(deb), field], capture_output=True, text=True,
         check=True).stdout for field in ('Depends', 'Description')}
     depends = said['Depends'].strip().split(', ')
-    assert {'ros-jazzy-rclpy', 'ros-jazzy-sensor-msgs', 'python3-yaml'} <= set(depends)
+    assert {'ros-jazzy-rclpy', 'ros-jazzy-sensor-msgs', 'ros-jazzy-launch-ros', 'python3-yaml',
+            'python3-lz4', 'python3-zstandard'} <= set(depends)
     assert not [name for name in depends if name.endswith('-pip') or 'mcap' in name]
     for name in ('mujoco', 'rosbags', 'mcap'):
         assert name in said['Description']
+    assert 'lz4' not in said['Description']
 
 
 @installed
