@@ -22,7 +22,7 @@ from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.nodes.messages.interfaces import SERVICES, TOPICS
 from dmp_cpg_ros.nodes.messages.markers import FEET, FOOTHOLDS, FORCES, PATHS
 from dmp_cpg_ros.nodes.messages.robot_state import BASE_FRAME, ODOM_FRAME
-from dmp_cpg_ros.suite_table import instances
+from dmp_cpg_ros.suite_table import DRIVER, instances
 
 CONFIG = ROOT / 'config'
 RVIZ, FOXGLOVE, PLOTJUGGLER = (CONFIG / tool / f'dmp_cpg_ros.{kind}' for tool, kind in (
@@ -123,7 +123,7 @@ def test_every_node_reports_into_one_group(place: str) -> None:
               if isinstance(group, dict)}
     assert all(group['path'] == name and group['type'] == 'diagnostic_aggregator/GenericAnalyzer'
                for name, group in groups.items())
-    for _, node, _ in instances():
+    for node in (*(name for _, name, _ in instances()), DRIVER):
         found = [name for name, group in groups.items()
                  if any(word in place + node for word in group['contains'])]
         assert len(found) == 1, node
