@@ -117,7 +117,8 @@ def events() -> str:
         if isinstance(read, partial):
             (what,) = read.args
             return f'`{what}: true` requests it as the service `{what}` does'
-        return (inspect.getdoc(read) or '').split('\n')[0].replace('``', '`').removeprefix('Read ')
+        text = (inspect.getdoc(read) or '').split('\n\n')[0].replace('\n', ' ')
+        return text.replace('``', '`').removeprefix('Read ')
 
     assert set(REQUESTS) <= set(EVENT_KINDS)
     return _table(('event', 'value'), (

@@ -278,7 +278,8 @@ def _parser() -> argparse.ArgumentParser:
     sharing = parser.add_mutually_exclusive_group()
     sharing.add_argument(
         '--processes', choices=('each', 'blocks'), default='each',
-        help='a process for every node (default), or for every block: gait, posture, legs, robot')
+        help='a process for every node (default), or for every block: gait, supervision, '
+        'legs, robot')
     sharing.add_argument('--composed', dest='processes', action='store_const', const='composed',
                          help='all nodes in one process and one executor')
     add('--respawn', action='store_true',

@@ -24,6 +24,7 @@ import numpy as np
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.studies import loop_recording as runs
 from dmp_cpg_ros.studies import output
 from dmp_cpg_ros.studies import walking_trials as trials
@@ -214,10 +215,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _duel(options: argparse.Namespace, _: RosArguments) -> int:
     policy = load_policy(options.policy, options.network)
-    walkers = [Walker(POLICY, options.robot, policy, 0.0), *(
-        Walker(load_gait(gait).name, options.robot, None, options.braking)
+    robot = str(find_config(options.robot, ROBOTS))
+    walkers = [Walker(POLICY, robot, policy, 0.0), *(
+        Walker(load_gait(gait).name, robot, None, options.braking)
         for gait in options.gaits)]
-    PolicyRun(policy, options.robot).walk(0.1)  # what does not fit is said at once
+    PolicyRun(policy, robot).walk(0.1)  # what does not fit is said at once
     with Workers(options.workers, options.cluster) as workers:
         tell(((name, TABLES[name](walkers, options.phases, workers)) for name in options.tables),
              options.json)
