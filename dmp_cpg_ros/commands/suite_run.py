@@ -26,7 +26,7 @@ ENDED_WITHIN_S = 15.0
 
 def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: Path, say: Say,
               server: ForkServer, *, lock_step: bool, processes: str, view: bool = False,
-              visualization: bool = False, respawn: bool = False) -> list[str]:
+              visualization: bool = False, respawn: bool = False) -> tuple[bool, list[str]]:
     """Run the suite from nothing to nothing.
 
     A walk goes on without its recorder, which says at once when it cannot write any more, and
@@ -60,8 +60,10 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
 
     Returns
     -------
-    list of str
-        What went wrong all the same: how the recorder ended before its time, how many events of
+    whole : bool
+        Whether all of the walk was recorded.
+    told : list of str
+        What is to be said at the end: how the recorder ended before its time, how many events of
         the scenario were refused.
 
     Raises
@@ -109,9 +111,9 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
                 say(math.nan, f'had to kill {", ".join(killed)}')
         if killed:
             raise SuiteError(f'{", ".join(killed)} hung: no answer at the end of the run')
-    wrong = {f'{watch.unrecorded}; the rest of the walk was not recorded': watch.unrecorded,
-             f'{player.refused} of {len(scenario.events)} events were refused': player.refused}
-    return [told for told, so in wrong.items() if so]
+    told = {f'{watch.unrecorded}; the rest of the walk was not recorded': watch.unrecorded,
+            f'{player.refused} of {len(scenario.events)} events were refused': player.refused}
+    return not watch.unrecorded, [text for text, so in told.items() if so]
 
 
 def _start(group: ProcessGroup, shared: Mapping[str, Sequence[str]], arguments: Sequence[str]

@@ -150,7 +150,7 @@ def _walk(plan: _Plan, server: ForkServer) -> int:
           f'grade; at rest at most {plan.certificate.time_to_rest:.3f} s after a request',
           flush=True)
     made = 'metrics' if options.no_report else 'report'
-    status, wrong = _run(plan, folder, server)
+    status, ending = _run(plan, folder, server)
     try:
         if (folder / 'bag').is_dir():
             if status > INTERRUPTED:
@@ -161,7 +161,7 @@ def _walk(plan: _Plan, server: ForkServer) -> int:
     except KeyboardInterrupt:
         print(f'walk: {made} skipped; to make the {made}: analyze {folder}', file=sys.stderr)
         status = INTERRUPTED + signal.SIGINT
-    for told in wrong:
+    for told in ending:
         print(f'walk: {told}', file=sys.stderr)
     print(f'{folder.name}: {time.monotonic() - begin:.0f} s in all')
     return status
@@ -191,8 +191,8 @@ def load_scenario(name: str | Path) -> Scenario:
 
 
 def _run(plan: _Plan, folder: Path, server: ForkServer) -> tuple[int, list[str]]:
-    """Bring the suite up, play, bring it down; returns the exit status and what went wrong while
-    it walked on.
+    """Bring the suite up, play, bring it down; returns the exit status and what to say at the
+    end.
     """
     from dmp_cpg_ros.commands.ending_signals import InterruptedRunError
     from dmp_cpg_ros.commands.suite_run import run_suite
@@ -208,11 +208,11 @@ def _run(plan: _Plan, folder: Path, server: ForkServer) -> tuple[int, list[str]]
     arguments = ['--ros-args', '--params-file', str(file), *ros.others,
                  *(word for name, to in rules for word in ('-r', f'{name}:={to}'))]
     try:
-        wrong = run_suite(
+        whole, told = run_suite(
             plan.scenario, plan.suite.tick_ns, arguments, folder / 'logs', _say, server,
             lock_step=options.lock_step, processes=options.processes,
             view=options.view, visualization=options.visualization, respawn=options.respawn)
-        return FAILED if wrong else OK, wrong
+        return OK if whole else FAILED, told
     except InterruptedRunError as error:
         print(f'walk: {error}; the recording up to here is complete', file=sys.stderr)
         return INTERRUPTED + error.signal, []
@@ -266,8 +266,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='walk',
         description='Bring the suite up, play a scenario, record, report, shut everything down.',
-        epilog='Exit status: 0 when all went well, 1 when the robot fell, a node died or an event '
-        'was refused, 2 for bad input or where a suite is running already, 130 for Ctrl-C. '
+        epilog='Exit status: 0 when all went well, 1 when the robot fell or a node died, 2 for '
+        'bad input or where a suite is running already, 130 for Ctrl-C. '
         f'Scenarios: {", ".join(sorted(scenarios))}.')
     add = parser.add_argument
     add('scenario', nargs='?',
