@@ -44,7 +44,7 @@ HIGHER: tuple[Ground, ...] = (('steps', {'height': 0.15, **STAIRS}),)
 
 CLIMBER = 'robots/go2.yaml'
 
-CLIMBING: dict[Values, str] = {(): 'off', (('climbing', True),): 'on'}
+CLIMBING: dict[Values, str] = {(('climbing', False),): 'off', (): 'on'}
 """The parameter, without and with which stairs are walked at."""
 
 UNTUNED = 100

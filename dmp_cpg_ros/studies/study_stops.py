@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stops and starts the walking robot at many phases, speeds and gaits; tabulates what happened.
 
-The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
+The robot is the MuJoCo one in the plain loop, its state estimated from exact sensors.
 Exit status 1 when it fell in a case that was stopped by inhibition, 2 when the arguments cannot
 be used.
 

@@ -16,8 +16,7 @@ ON_TOP, DOWN = 1.6, 3.2
 
 
 def test_trot_climbs_two_stairs_and_forgets_them() -> None:
-    run = Walk('trot', world=Steps(height=HIGHEST_STEP, depth=0.3, count=2, platform=4.0), seed=3,
-               values=(('climbing', True),))
+    run = Walk('trot', world=Steps(height=HIGHEST_STEP, depth=0.3, count=2, platform=4.0), seed=3)
     run.loop.command(0.5)
     roughest = 0.0
     while run.state.base_position_in_world[0] < ON_TOP and run.state.time_ns < 12e9:
@@ -32,8 +31,7 @@ def test_trot_climbs_two_stairs_and_forgets_them() -> None:
 
 def test_trot_comes_down_stairs_without_diving() -> None:
     """At the foot of the way down a plane through the footholds leans by 27 degrees."""
-    run = Walk('trot', world=Steps(height=HIGHEST_STEP, depth=0.3, count=3, platform=0.6), seed=4,
-               values=(('climbing', True),))
+    run = Walk('trot', world=Steps(height=HIGHEST_STEP, depth=0.3, count=3, platform=0.6), seed=4)
     run.loop.command(0.5)
     steepest = 0.0
     while run.state.base_position_in_world[0] < DOWN and run.state.time_ns < 16e9:
@@ -44,7 +42,8 @@ def test_trot_comes_down_stairs_without_diving() -> None:
 
 
 def test_without_climbing_nothing_is_remembered() -> None:
-    run = Walk('trot', world=Steps(height=HIGHEST_STEP, depth=0.3, count=2, platform=4.0), seed=3)
+    run = Walk('trot', world=Steps(height=HIGHEST_STEP, depth=0.3, count=2, platform=4.0), seed=3,
+               values=(('climbing', False),))
     run.loop.command(0.5)
     assert run.walk(2.5)
     assert run.loop.posture.balance.terrain == NOTHING_FELT
@@ -62,7 +61,7 @@ def test_first_step_is_told_slowly_and_on_both_sides_and_ends_alone(
         calm.append(args[-1])
         return felt(self, *args)
 
-    run = Walk(gait, values=(('climbing', True),))
+    run = Walk(gait)
     run.loop.command(speed)
     assert run.walk(2.5)
     monkeypatch.setattr(Terrain, 'felt', noted)

@@ -51,8 +51,7 @@ class PostureParameters(Parameters):
     levelling: float = parameter(
         1.0, 'fraction of the tilt that the height of swinging feet compensates', 0.0, 1.0)
     climbing: bool = parameter(
-        False, 'whether all legs step over what one foot has felt, and stand where the ground is: '
-        'most stairs are climbed then, and the robot falls where it would have stopped')
+        True, 'whether all legs step over what one foot has felt, and stand where the ground is')
     speed_integral: float = parameter(
         0.135, 'rate at which the stance velocity is corrected by the velocity error, in '
         'sqrt(g/l)', 0.0, 10.0)

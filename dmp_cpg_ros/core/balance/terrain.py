@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Memory of how rough the ground is, which all legs share where ``climbing`` is on.
+"""Memory of how rough the ground is, which all legs share unless ``climbing`` is off.
 
 A leg that feels alone learns of every step by tripping over it, and it stands on a step as if that
 were level: it goes back to the height of the others and throws the body to its side. What one foot
