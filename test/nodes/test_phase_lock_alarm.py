@@ -22,6 +22,7 @@ from rclpy.parameter import Parameter
 from rclpy.task import Future
 from ros_processes import Ros
 
+from dmp_cpg_ros.core.canonical.coupling import graph_from_edges
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework.judging import judge
 from dmp_cpg_ros.nodes.messages.interfaces import interface
@@ -189,3 +190,20 @@ def test_a_judge_that_dies_costs_ticks_and_no_answer(walking: Walking) -> None:
         os.kill(judge().pid, signal.SIGKILL)
     assert walking.answer(asked) == (True, '')
     assert walking.change(coupling_gain=70.0) == (True, '')
+
+
+@pytest.mark.parametrize(('compute', 'reason'), [
+    (partial(graph_from_edges, 2, ((0, 1),), 0.0), 'must have a positive definite'),
+    (partial(int, 'no number'), 'ValueError')])
+def test_a_judgement_that_fails_refuses_its_request_and_holds_up_no_other(
+        walking: Walking, monkeypatch: pytest.MonkeyPatch, compute: partial[object], reason: str
+        ) -> None:
+    certified, failing = walking.node.certified, iter([(compute, list)])
+    judges = certified.to_judge
+    monkeypatch.setattr(certified, 'to_judge', lambda sets: next(failing, None) or judges(sets))
+    asked, following = walking.ask(coupling_gain=80.0), walking.ask(coupling_gain=70.0)
+    successful, told = walking.answer(asked)
+    assert not successful and reason in told
+    assert walking.answer(following) == (True, '')
+    walking.tick(1)
+    assert walking.node.get_parameter('coupling_gain').value == 70.0

@@ -43,7 +43,7 @@ class CanonicalParameters(Parameters):
 
     rho: float = parameter(8.0, 'attraction rho to the limit cycle', 0.1, 1e3, unit='1/s')
     radius: float = parameter(1.0, 'radius r of the limit cycle', 0.01, 100.0)
-    coupling_gain: float = parameter(100.0, 'gain k of every coupling', 0.0, 1e4, unit='1/s')
+    coupling_gain: float = parameter(100.0, 'gain k of every coupling', 0.01, 1e4, unit='1/s')
     coupling_graph: str = parameter(
         'all_to_all', 'coupling graph of the legs',
         choices=('all_to_all', 'ring', 'path', 'star', 'directed_ring'))

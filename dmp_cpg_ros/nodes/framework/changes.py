@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.parameters import typed
 from dmp_cpg_ros.core.suite_parameters import OWNER
 from dmp_cpg_ros.nodes.framework import parameters
-from dmp_cpg_ros.nodes.framework.judging import InTurn, Step, beside_ticks
+from dmp_cpg_ros.nodes.framework.judging import InTurn, Step, Steps, beside_ticks
 
 if TYPE_CHECKING:
     from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
@@ -78,21 +78,34 @@ class ParameterChanges:
         """
         return self._in_turn.take(self._steps(make, request, response), response)
 
-    def _steps(self, make: Callable[[Any, Any], Any], request: Any, response: Any
-               ) -> Iterator[Step]:
+    def _steps(self, make: Callable[[Any, Any], Any], request: Any, response: Any) -> Steps:
         make = self._node.guarded('set_parameters', make)
         entries, one_by_one = list(request.parameters), hasattr(response, 'results')
         for group in [[entry] for entry in entries] if one_by_one else [entries]:
+            refused = yield from self._refusal(group)
+            if refused is None:
+                made = make(type(request)(parameters=group), type(response)())
+                results = made.results if one_by_one else [made.result]
+            else:
+                results = [refused]
+            if one_by_one:
+                response.results.extend(results)
+            else:
+                (response.result,) = results
+
+    def _refusal(self, group: Sequence[Any]) -> Generator[Step, None, SetParametersResult | None]:
+        """Have what a change is judged by computed; why it is refused where that is impossible."""
+        try:
             for _ in range(MOST_VERDICTS):
                 asked = self._to_judge(group)
                 if asked is None:
                     break
                 yield asked
-            made = make(type(request)(parameters=group), type(response)())
-            if one_by_one:
-                response.results.extend(made.results)
-            else:
-                response.result = made.result
+        except Exception as error:  # noqa: BLE001 - whatever it is, the request is answered
+            expected = isinstance(error, DmpCpgError)
+            reason = str(error) if expected else self._node.drop('set_parameters', error)
+            return SetParametersResult(successful=False, reason=reason)
+        return None
 
     def _to_judge(self, entries: Sequence[Any]) -> Step | None:
         """What has to be computed before a change can be judged at once."""

@@ -19,9 +19,9 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from functools import lru_cache, partial
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
@@ -33,6 +33,10 @@ Use = Callable[[Any], None]
 
 Step = tuple[Compute, Use]
 """What has to be computed before something goes on, and who takes the result."""
+
+Steps = Generator[Step, None, None]
+"""What has to be computed, one after the other. What a computation or its use raises is raised in
+them."""
 
 NICENESS = 10
 """How far the process yields to those with ticks."""
@@ -146,6 +150,20 @@ def _answer(compute: Compute, answers: IO[bytes]) -> None:
     answers.flush()
 
 
+class Raised(NamedTuple):
+    """What was raised instead of a result."""
+
+    error: Exception
+
+
+def attempted(compute: Compute) -> Any:
+    """What is computed, or what was raised."""
+    try:
+        return compute()
+    except Exception as error:  # noqa: BLE001 - whoever waits for the result has to know
+        return Raised(error)
+
+
 class Later:
     """Stands for the response of a service that is not there yet."""
 
@@ -188,14 +206,14 @@ class InTurn:
     def __init__(self, beside: Callable[[Compute, Use], None]) -> None:
         """Start without requests."""
         self._beside = beside
-        self._waiting: deque[tuple[Iterator[Step], Any, Later]] = deque()
+        self._waiting: deque[tuple[Steps, Any, Later]] = deque()
 
-    def take(self, steps: Iterator[Step], response: Any) -> Any:
+    def take(self, steps: Steps, response: Any) -> Any:
         """Answer a request.
 
         Parameters
         ----------
-        steps : iterator of Step
+        steps : Steps
             What has to be computed before it goes on, each time; fills the response meanwhile.
         response : object
             Of the service.
@@ -216,15 +234,23 @@ class InTurn:
         return later
 
     def _compute(self, compute: Compute, use: Use) -> None:
-        self._beside(compute, partial(self._go_on, use))
+        self._beside(partial(attempted, compute), partial(self._used, use))
 
-    def _go_on(self, use: Use, result: Any) -> None:
-        use(result)
-        while self._waiting:
-            steps, response, later = self._waiting[0]
-            step = next(steps, None)
-            if step is not None:
-                self._compute(*step)
-                return
-            self._waiting.popleft()
+    def _used(self, use: Use, result: Any) -> None:
+        self._go_on(result if isinstance(result, Raised) else attempted(partial(use, result)))
+
+    def _go_on(self, before: Any = None) -> None:
+        """Go on with the request whose turn it is, whatever came of its last step."""
+        steps, response, later = self._waiting[0]
+        step = None
+        with contextlib.suppress(StopIteration):
+            step = steps.throw(before.error) if isinstance(before, Raised) else next(steps)
+        if step is not None:
+            self._compute(*step)
+            return
+        self._waiting.popleft()
+        try:
             later.deliver(response)
+        finally:
+            if self._waiting:
+                self._go_on()

@@ -16,6 +16,8 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import phase, state_at, wrapped
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.parameters import range_of
 
 FREE = Inhibition(False, np.zeros(4), 0.3)
 NAMES = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
@@ -161,3 +163,10 @@ def test_as_many_oscillators_as_nodes() -> None:
     graph = graph_from_edges(3, topology('ring', 3), 1.0)
     with pytest.raises(ParameterError, match='3 nodes need one radius or 3, not 2'):
         CanonicalSystem(graph, AndronovHopf(1.0, np.ones(2)))
+
+
+def test_every_coupling_gain_that_is_allowed_couples() -> None:
+    weakest = range_of(CanonicalParameters, 'coupling_gain')[0]
+    assert network(coupling_gain=weakest).system.graph.gains.any()
+    with pytest.raises(ParameterError, match='coupling_gain.*outside its range'):
+        network(coupling_gain=0.0)
