@@ -19,6 +19,7 @@ from dmp_cpg_ros.core.canonical.inhibition import (
     initial_inhibition,
 )
 from dmp_cpg_ros.core.certificates.lock_watch import LOCKED, LOST, PhaseLock, PhaseLockWatch
+from dmp_cpg_ros.core.clock import fresh
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.contact_feedback import quarter_weight
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
@@ -120,7 +121,7 @@ class CanonicalOscillators(SuiteNode):
         if gains is None:
             return
         known_ns, self._inhibition = gains
-        if self.lock_step or stamp_ns - known_ns <= SILENT_NS:
+        if self.lock_step or fresh(known_ns, stamp_ns, SILENT_NS):
             if self._silent is not None:
                 self._silent = None
                 self.clear('inhibition')

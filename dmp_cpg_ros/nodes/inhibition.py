@@ -161,6 +161,7 @@ class InhibitionNode(SuiteNode):
             before, stamp_ns, network, self._x, self._x_dot, self._r, self._gate.at(stamp_ns),
             self._votes.tally, self._barring, margins, progress, self.certified.wanted)
         self._acting = self._supervisor.inhibition(self._state)
+        self._due_ns += min(0, stamp_ns - before.time_ns)  # it goes with a clock that is set back
         if self._state.requested != before.requested:
             self._predict()
         self._tell_block(before)
@@ -169,7 +170,7 @@ class InhibitionNode(SuiteNode):
             self._publish()
         balance = (self._state.share, self._state.quickness)
         if (news or self.lock_step or balance != (before.share, before.quickness)
-                or stamp_ns - self._told_ns >= HEARTBEAT_NS):
+                or not 0 <= stamp_ns - self._told_ns < HEARTBEAT_NS):
             self._publish_gains()
         if self.lock_step:
             self._memory.publish(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.clock import fresh
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import approached
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -61,7 +62,7 @@ class ReferenceFilter(SuiteNode):
         command, gains = self._gate.at(stamp_ns), values['inhibition_gains']
         if gains is not None:
             self._inhibition = gains[1]
-            if not self.lock_step and stamp_ns - gains[0] > SILENT_NS:
+            if not (self.lock_step or fresh(gains[0], stamp_ns, SILENT_NS)):
                 self._inhibition = replace(gains[1], requested=True)
         self._r = self._system.towards(self._r, command, self._inhibition, dt)
         self._publisher.publish(self._writer.fill(stamp_ns, self._r))

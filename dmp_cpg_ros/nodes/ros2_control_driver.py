@@ -18,6 +18,7 @@ from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import Float64MultiArray
 
 from dmp_cpg_ros.core import suite_parameters as core
+from dmp_cpg_ros.core.clock import RESET_NS, fresh
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.parameters import Parameters, parameter
@@ -25,7 +26,7 @@ from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.robot_model.target_limits import TargetLimits
 from dmp_cpg_ros.nodes.framework.driven_robot import RETREATS, DrivenRobot
 from dmp_cpg_ros.nodes.framework.gaits import description_of
-from dmp_cpg_ros.nodes.framework.ticks import AHEAD_NS, RESET_NS
+from dmp_cpg_ros.nodes.framework.ticks import AHEAD_NS
 from dmp_cpg_ros.nodes.messages.interfaces import (
     COMMAND_INTERFACES,
     IMU_BROADCASTER,
@@ -145,9 +146,9 @@ class Ros2ControlDriver(DrivenRobot):
         told, quaternion, rate, force = self._imu
         if quaternion is None:
             quaternion = np.array((0.0, 0.0, 0.0, 1.0))
-        if stamp - told > FRESH_NS:
+        if not fresh(told, stamp, FRESH_NS):
             rate = force = np.full(3, np.nan)
-        feet = [size if stamp - at <= FRESH_NS else np.nan for at, size in self._feet]
+        feet = [size if fresh(at, stamp, FRESH_NS) else np.nan for at, size in self._feet]
         position, velocity, effort = measured
         return RobotState(stamp, position, velocity, effort, np.zeros(3), quaternion, np.zeros(3),
                           rate, force, np.array(feet))
@@ -206,8 +207,8 @@ class Ros2ControlDriver(DrivenRobot):
                 'the legs are not followed any more; the robot looks after itself'
                 if self._commanding else 'nothing is commanded')
         stamp, quaternion, *_ = self._imu
-        if self._state.time_ns < 0 or quaternion is None or (
-                self._state.time_ns - stamp > FRESH_NS):
+        now = self._state.time_ns
+        if now < 0 or quaternion is None or not fresh(stamp, now, FRESH_NS):
             return False, ('joint states and an IMU with its orientation are needed first: '
                            'without them nobody knows whether the robot stands')
         if not self._commanding:

@@ -139,6 +139,24 @@ def test_the_legs_are_followed_within_limits_when_they_rest_where_the_joints_are
             ros.spin_until(lambda count=count: rejected.get('joint_targets', 0) == count)
 
 
+def test_a_reading_of_before_the_clock_was_set_back_tells_nothing(ros: Ros) -> None:
+    with bench(ros, 'position') as made:
+        made.told()
+        driver, now = made.driver, made.robot.state.time_ns
+        ros.spin_until(lambda: driver._imu[0] == now)
+        _, *told = driver._imu
+        for ahead_ns, known in ((1_000_000_000, False), (2_000_000, True)):
+            driver._imu, driver._feet[0] = (now + ahead_ns, *told), (now + ahead_ns, 1.0)
+            state = driver._state_at(now, np.zeros((3, 12)))
+            assert bool(np.isfinite(state.acceleration_in_base).all()) == known
+            assert bool(np.isfinite(state.foot_force[0])) == known
+            assert driver._take_request(SetBool.Request(data=True))[0] == known
+            driver.health.set_problem('late', 'told then')
+            driver._silent_ns['late'] = now + ahead_ns
+            driver._tell_silence('late', now, False, str)
+            assert driver.health.has_problem('late') == known
+
+
 @pytest.mark.parametrize('period_ns', [2_000_000, 3_100_000, 4_000_000, 9_000_000])
 def test_ticks_are_whole_at_any_rate_and_a_silent_imu_tells_nothing(
         ros: Ros, period_ns: int) -> None:

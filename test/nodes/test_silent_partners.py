@@ -20,7 +20,7 @@ from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework.known_stop import BRIEF_NS, PATIENT_NS
-from dmp_cpg_ros.nodes.inhibition import InhibitionNode
+from dmp_cpg_ros.nodes.inhibition import HEARTBEAT_NS, InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
 from dmp_cpg_ros.nodes.messages.values import header_ns
@@ -182,6 +182,60 @@ def test_reference_and_oscillators_stop_without_the_inhibition(ros: Ros) -> None
     assert not canonical._inhibition.requested
     for node in (reference, canonical):
         node.destroy_node()
+
+
+def test_gains_of_before_a_clock_that_was_set_back_are_those_of_a_silent_inhibition(ros: Ros
+        ) -> None:
+    reference = ReferenceFilter('reference_filter', context=ros.context)
+    canonical = CanonicalOscillators('canonical_oscillators', context=ros.context)
+    for node in (reference, canonical):
+        node.start()
+    for told_ns, silent in ((1_000_000_000_000, True), (TICK, False)):
+        told = (told_ns, RUNS)
+        reference.on_tick(2 * TICK, {'joint_states': None, 'inhibition_gains': told})
+        canonical.on_tick(2 * TICK, {'reference': np.zeros(3), 'inhibition_gains': told})
+        assert reference._inhibition.requested == canonical._inhibition.requested == silent
+    for node in (reference, canonical):
+        node.destroy_node()
+
+
+def test_gains_and_promise_go_on_when_the_clock_is_set_back(ros: Ros) -> None:
+    node, now = watching(ros, KNOWN)
+    node._take_request(SetBool.Request(data=True))
+    due_s = 1e-9 * (node._due_ns - now)
+    told: list[Any] = []
+    node._gains_publisher.publish = told.append  # type: ignore[method-assign]
+    _, state, tick = walked(300)
+    for k in range(1, 60):
+        tick_at(node, state, tick, k * TICK)
+    passed = 59 * TICK // HEARTBEAT_NS
+    assert len(told) > passed >= 2
+    assert 1e-9 * (node._due_ns - state.time_ns - TICK) == pytest.approx(due_s)
+    node.destroy_node()
+
+
+def test_what_acts_is_told_again_when_the_clock_is_set_back(ros: Ros) -> None:
+    node = CanonicalOscillators('canonical_oscillators', context=ros.context)
+    node.start()
+    told: list[int] = []
+    node._known._publisher.publish = (  # type: ignore[method-assign]
+        lambda message: told.append(header_ns(message)))
+    later = 1_000_000_000_000
+    for stamp_ns, what in ((later, RUNS), (later - TICK, STOPPED), (2 * TICK, RUNS),
+                           (3 * TICK, RUNS), (0, STOPPED), (4 * TICK, STOPPED)):
+        node._known.learn(stamp_ns, what)
+    assert told == [later, 2 * TICK, 4 * TICK]
+    node.destroy_node()
+
+
+@pytest.mark.parametrize('back_ns', [0, 1_000_000_000])
+def test_a_restarted_node_does_not_wait_longer_for_a_clock_that_is_set_back(
+        ros: Ros, back_ns: int) -> None:
+    node, _ = watching(ros, wait_ns=TICK)
+    now = node.health.stamp_ns - back_ns
+    assert not node._others.have_told(now)
+    assert node._others.have_told(now + PATIENT_NS)
+    node.destroy_node()
 
 
 def test_a_leg_without_feedback_of_the_posture_says_nothing(ros: Ros) -> None:

@@ -21,7 +21,7 @@ from math import exp, isfinite
 
 import numpy as np
 
-from dmp_cpg_ros.core.clock import LONGEST_GAP_S
+from dmp_cpg_ros.core.clock import time_step
 from dmp_cpg_ros.core.estimation import frozen, leg_odometry, mid_stride, velocity_filter
 from dmp_cpg_ros.core.estimation.leg_odometry import FootMotion, TerrainState, normal_in_world
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
@@ -187,7 +187,7 @@ class BodyEstimator:
         if memory is None or readings.time_ns <= memory.estimate.time_ns:
             return self._begin(readings)
         watch, readings = frozen.without_frozen(memory.watch, readings)
-        dt = min((readings.time_ns - memory.estimate.time_ns) * 1e-9, LONGEST_GAP_S)
+        dt = time_step(memory.estimate.time_ns, readings.time_ns)
         seeing = readings.imu_is_usable
         blind = 0.0 if seeing and dt <= BLIND else memory.blind + dt
         noise = replace(self.parameters, **BLIND_NOISE) if blind else self.parameters
@@ -296,7 +296,7 @@ class BodyEstimator:
     ) -> tuple[TerrainState, BodyEstimate]:
         """Integrate the position, follow the ground, and put the estimate together."""
         last = memory.estimate
-        dt = min((time_ns - last.time_ns) * 1e-9, LONGEST_GAP_S)
+        dt = time_step(last.time_ns, time_ns)
         R = vec3.rotation(state.quaternion.tolist())
         v = vec3.times(R, vec3.triple(state.velocity_in_base.tolist()))
         u = vec3.times(vec3.rotation(last.quaternion.tolist()),

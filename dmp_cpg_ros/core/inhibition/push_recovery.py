@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
+from dmp_cpg_ros.core.clock import carried
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.maths import Array
@@ -79,6 +80,12 @@ class PushState(NamedTuple):
     low_ns: int = -1
     calm_ns: int = -1
     releases: int = 0
+
+    def carried(self, last_ns: int, now_ns: int) -> PushState:
+        """The same on a clock that was set back, see :func:`~dmp_cpg_ros.core.clock.carried`."""
+        since_ns, low_ns, calm_ns = (carried(stamp, last_ns, now_ns) for stamp in (
+            self.since_ns, self.low_ns, self.calm_ns))
+        return self._replace(since_ns=since_ns, low_ns=low_ns, calm_ns=calm_ns)
 
 
 NO_PUSH = PushState()

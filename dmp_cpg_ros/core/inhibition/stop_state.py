@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from dmp_cpg_ros.core.clock import carried
 from dmp_cpg_ros.core.inhibition.blocked import NO_BLOCK, BlockState
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, PushState
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.voting.votes import NO_VOTES, Tally
 
@@ -84,3 +86,10 @@ class SupervisorState:
     def in_force(self) -> bool:
         """Whether a stop is in force, a push or not: the reference is zero."""
         return self.requested or self.push.acts
+
+    def carried(self, now_ns: int) -> SupervisorState:
+        """The same on a clock that was set back, see :func:`~dmp_cpg_ros.core.clock.carried`."""
+        idle_ns, request_ns = (carried(stamp, self.time_ns, now_ns)
+                               for stamp in (self.idle_ns, self.request_ns))
+        return replace_unchecked(self, idle_ns=idle_ns, request_ns=request_ns,
+                                 push=self.push.carried(self.time_ns, now_ns))

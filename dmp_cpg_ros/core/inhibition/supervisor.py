@@ -25,6 +25,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
+from dmp_cpg_ros.core.clock import time_step
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.blocked import NO_BLOCK, Progress, block_step
@@ -156,7 +157,9 @@ class GaitSupervisor:
         wanted : Gait, optional
             Gait that was asked for, into which the one that acts changes at a lower speed.
         """
-        dt = max(0.0, (time_ns - state.time_ns) * 1e-9)
+        dt = time_step(state.time_ns, time_ns)
+        if time_ns < state.time_ns:
+            state = state.carried(time_ns)
         gait, rates = network.gait, scalar_phase_rates(x, x_dot)
         speed = network.scale.foot_speed(*r.tolist())
         omega, more = gait.omega(speed, network.scale), gait.rest_rate

@@ -12,6 +12,7 @@ from math import acos, inf
 
 import numpy as np
 
+from dmp_cpg_ros.core.clock import carried
 from dmp_cpg_ros.core.maths import Array, clamped
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import dot, upward
@@ -136,6 +137,10 @@ class FallState:
     """Since when the robot has been tilted, low and unsupported [ns]; −1 while it is not."""
 
     since_ns: tuple[int, ...] = (-1, -1, -1)
+
+    def carried(self, last_ns: int, now_ns: int) -> FallState:
+        """The same on a clock that was set back, see :func:`~dmp_cpg_ros.core.clock.carried`."""
+        return FallState(tuple(carried(stamp, last_ns, now_ns) for stamp in self.since_ns))
 
 
 class FallDetector:

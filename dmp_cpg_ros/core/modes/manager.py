@@ -18,6 +18,7 @@ import numpy as np
 from dmp_cpg_ros.core.balance.body_command import BALANCED, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase_rate
+from dmp_cpg_ros.core.clock import carried
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY, REST_PHASE_RATE, REST_SPEED
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
@@ -180,8 +181,11 @@ class ModeManager:
         """Advance by one tick to the body's condition at a stamp; `at_rest` says whether phases,
         reference and swings of the gait rest.
         """
-        begun = time_ns if state.begun_ns < 0 else state.begun_ns
-        fall, sign = state.fall, ''
+        begun, fall, sign = state.begun_ns, state.fall, ''
+        if time_ns < state.time_ns:
+            begun = carried(begun, state.time_ns, time_ns)
+            fall = fall.carried(state.time_ns, time_ns)
+        begun = time_ns if begun < 0 else begun
         if state.mode not in ('damped', 'recovering'):
             fall, sign = self._detector.step(fall, condition, time_ns, state.mode in BALANCED)
         state = replace_unchecked(

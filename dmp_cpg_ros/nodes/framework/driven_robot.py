@@ -9,6 +9,7 @@ from typing import Any
 
 from std_msgs.msg import String
 
+from dmp_cpg_ros.core.clock import fresh
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
@@ -103,7 +104,7 @@ class DrivenRobot(SuiteNode):
             if not self.health.has_problem(key):
                 self.warn(key, f'{what()}: the robot looks after itself: '
                           f'{RETREATS[self._guard.fallback]}', error=True)
-        elif now - self._silent_ns[key] > INCIDENT_NS:
+        elif not fresh(self._silent_ns[key], now, INCIDENT_NS):
             self.clear(key)
 
     def _lateness(self) -> str:

@@ -15,6 +15,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.clock import RESET_NS
 from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader, InhibitionGainsWriter
 from dmp_cpg_ros.nodes.messages.values import header_ns
 
@@ -50,7 +51,11 @@ class KnownStop:
         self._told: Inhibition | None = None
 
     def learn(self, stamp_ns: int, inhibition: Inhibition) -> None:
-        """Take what is known as of a stamp [ns], unless something newer is; tell what is new."""
+        """Take what is known as of a stamp [ns], unless something newer is; tell what is new, and
+        after the clock was set back what acts.
+        """
+        if 0 < stamp_ns <= self._stamp_ns - RESET_NS:
+            self._stamp_ns, self._told = -1, None
         new = self._told is None or self._stamp_ns <= 0 < stamp_ns or (
             inhibition.differs(self._told))
         if new and stamp_ns >= self._stamp_ns:
@@ -96,6 +101,7 @@ class OthersKnow:
         """Whether everybody who can tell has, or has had time to since this was asked first."""
         if self._asked_ns < 0:
             self._asked_ns = now_ns
+        self._asked_ns = min(self._asked_ns, now_ns)  # the clock may be set back meanwhile
         patience = PATIENT_NS if self.more_may_tell else BRIEF_NS
         return not self._silent or now_ns - self._asked_ns >= patience
 

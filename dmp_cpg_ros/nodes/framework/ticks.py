@@ -11,10 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-TickCallback = Callable[[int, dict[str, Any]], None]
+from dmp_cpg_ros.core.clock import RESET_NS
 
-RESET_NS = 100_000_000
-"""A stamp that lies this far behind the last tick is of a robot that was reset, or false [ns]."""
+TickCallback = Callable[[int, dict[str, Any]], None]
 
 AHEAD_NS = 2_000_000_000
 """A stamp that lies further ahead of the last tick is of a clock that was set, or false [ns]."""

@@ -135,6 +135,14 @@ def test_without_block_stop_or_knowledge_it_walks_on() -> None:
         assert run.loop.stop.state == 'walking' and run.loop.stop.block is NO_BLOCK
 
 
+def test_nobody_is_blocked_by_a_clock_that_is_set_ahead() -> None:
+    run = walking()
+    told(run)
+    run.go(0.1).time_ns += 1_000_000_000_000
+    run.go(TICK)
+    assert run.loop.stop.state == 'walking' and not run.loop.stop.block.acts
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.floats(SLOW, 1.5), st.floats(LEAST, 1.0), st.floats(-pi, pi), st.floats(1.1, 10.0))
 def test_no_body_is_blocked_that_makes_a_step_in_its_time(speed: float, share: float, angle: float,

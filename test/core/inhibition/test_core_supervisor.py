@@ -121,6 +121,30 @@ def test_a_zero_command_stops_after_the_delay_and_a_command_resumes() -> None:
     run.until('walking')
 
 
+@pytest.mark.parametrize('idle_s', [0.0, 0.3])
+def test_a_clock_that_is_set_back_does_not_put_off_a_stop(idle_s: float) -> None:
+    run = walking(inhibition=InhibitionParameters(auto_delay=0.5))
+    run.time_ns += 1_000_000_000_000
+    run.go(2 * TICK).loop.command(0.0)
+    run.go(idle_s + TICK).time_ns = 0
+    run.go(0.5 + 2 * TICK)
+    assert run.loop.stop.requested
+    run.until('at_rest')
+    assert 0.0 < run.loop.stop.measured_s < 2.0
+
+
+def test_a_stop_keeps_its_time_when_the_clock_is_set_back() -> None:
+    run = walking()
+    other = run.copy()
+    for each in (run, other):
+        each.loop.request(True)
+        each.go(0.1)
+    run.time_ns -= 1_000_000_000
+    for each in (run, other):
+        each.until('at_rest')
+    assert run.loop.stop.measured_s == other.loop.stop.measured_s
+
+
 def test_silence_of_the_command_leads_to_the_same_stop() -> None:
     run = walking(reference=ReferenceParameters(cmd_vel_timeout=0.5), seconds=TICK,
                   inhibition=InhibitionParameters(auto_delay=0.5))

@@ -126,6 +126,20 @@ def test_it_ends_whatever_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     assert run.loop.stop.state == 'releasing'
 
 
+def test_it_ends_on_a_clock_that_is_set_back() -> None:
+    run, body = resting()
+    run.time_ns += 1_000_000_000_000
+    run.go(TICK)
+    body.margins = TO_THE_LEFT
+    run.until('stepping')
+    body.margins = WIDE
+    run.go(TICK).time_ns = 0
+    run.until('waiting', 'captured')
+    body.margins = TO_THE_LEFT
+    run.go(TICK).time_ns = 0  # the margin has been low since then
+    run.until('releasing', longest=0.1)
+
+
 @pytest.mark.parametrize(('margins', 'turns'), [(TO_THE_LEFT, False), (TO_THE_RIGHT, True)])
 def test_the_legs_on_the_side_of_the_fall_swing_first(
         margins: tuple[float, ...], turns: bool) -> None:

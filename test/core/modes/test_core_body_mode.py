@@ -224,6 +224,26 @@ def test_the_detector_keeps_its_delays() -> None:
     assert (k - 1) * TICK == pytest.approx(0.2)
 
 
+def test_a_fall_is_found_on_a_clock_that_is_set_back() -> None:
+    machine = Machine()
+    machine.time_ns = 1_000_000_000_000
+    machine.go(0.08, LEFT).time_ns = 500_000_000_000
+    machine.go(0.04, LEFT)  # together longer than the delay
+    assert machine.state.mode == 'damped'
+
+
+def test_a_movement_goes_on_where_it_is_when_the_clock_is_set_back() -> None:
+    machine = Machine('lying').go(0.1, FOLDED)
+    machine.time_ns = 1_000_000_000_000
+    machine.go(TICK, FOLDED).ask('stand_up')
+    phase = machine.modes.command(machine.go(0.3, FOLDED).state).x
+    machine.time_ns = 500_000_000_000
+    machine.go(TICK, FOLDED)
+    assert machine.modes.command(machine.state).x == phase < 1.0
+    machine.time_ns = 0
+    assert machine.go(5.0).state.mode == 'standing'
+
+
 def rolled(state: RobotState, angle: float) -> RobotState:
     return replace(state, base_quaternion=np.array(
         (math.sin(0.5 * angle), 0.0, 0.0, math.cos(0.5 * angle))))
