@@ -12,8 +12,9 @@
 - ``stepping``: a push has released the gait from a stop, which stays in force; it is on the spot
   (:mod:`~dmp_cpg_ros.core.inhibition.push_recovery`).
 
-A robot that makes no way although it walks requests a stop itself
-(:mod:`~dmp_cpg_ros.core.inhibition.caution`).
+A robot that is disturbed follows less of its command
+(:mod:`~dmp_cpg_ros.core.inhibition.caution`); one that makes no way although it walks requests a
+stop itself (:mod:`~dmp_cpg_ros.core.inhibition.blocked`).
 """
 
 from __future__ import annotations
@@ -190,11 +191,10 @@ class GaitSupervisor:
         """
         p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.wide)
         predicted = state.requested or state.state == 'releasing'
-        share = 1.0
+        share, most = 1.0, min(most, state.block.most)
         if not (predicted or state.push.acts):
-            share = (followed_share(state.share, left, dt, min(most, state.block.most),
-                                    CLIMBING if rough else LEAST)
-                     if p.caution else followed_share(state.share, None, dt, most))
+            share = followed_share(state.share, left if p.caution else None, dt, most,
+                                   CLIMBING if rough else LEAST)
         free = p.step_timing and (state.push.acts or not predicted) and not rough
         quickness = quickened(state.quickness, left if free else None, dt)
         same = (share, quickness) == (state.share, state.quickness)

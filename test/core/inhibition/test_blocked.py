@@ -175,6 +175,15 @@ def test_a_body_waits_for_feet_that_are_held_and_stops_when_they_stay_so() -> No
     assert ticks * TICK * BRISK * FROUDE == pytest.approx(FIRM * LENGTH, rel=0.1)
 
 
+@pytest.mark.parametrize('caution', [True, False])
+def test_the_command_is_not_followed_farther_than_the_feet_allow(caution: bool) -> None:
+    run = walking(inhibition=InhibitionParameters(caution=caution))
+    told(run, Progress((0.1, 0.0), 0.5 * (HELD + PINNED) * run.loop.canonical.scale.leg_length))
+    run.go(0.4)
+    assert run.loop.stop.state == 'walking'
+    assert run.loop.stop.share == run.loop.stop.block.most < 0.9
+
+
 def test_a_body_that_runs_ahead_of_its_feet_is_not_held() -> None:
     r, state = np.array((0.5, 0.0, 0.0)), NO_BLOCK
     for _ in range(500):
