@@ -4,16 +4,24 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.task import Future
+from rclpy.timer import Timer
 
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
 from dmp_cpg_ros.nodes.framework.parameters import plain
+
+ASK_EVERY_S, PATIENCE_S = 0.05, 20.0
+"""How often a follower is asked whether it knows a change, and for how long [s]: who has missed
+the news hears of it from the owner within some seconds.
+"""
 
 
 def ask(client: Any, request: Any, done: Callable[[bool, str], None]) -> None:
@@ -45,6 +53,8 @@ class ParameterSetter:
 
     def __init__(self, node: Node) -> None:
         """Create the clients."""
+        self._node: Any = node
+        self._timer: Timer | None = None
         self._setters = {owner: node.create_client(
             SetParametersAtomically, f'{owner}/set_parameters_atomically') for owner in CHANGEABLE}
         self._getters = {owner: node.create_client(GetParameters, f'{owner}/get_parameters')
@@ -63,8 +73,8 @@ class ParameterSetter:
         values : mapping of str to value
             Parameters of one owner.
         done : callable (reason)
-            Called with why the change is refused, or with an empty text once the owner has
-            accepted it and all followers know it.
+            Called with why the change is refused, or which follower does not know it after
+            ``PATIENCE_S``, or with an empty text once the owner has accepted it and all do.
         """
         owner = OWNER[next(iter(values))]
         wanted = {name: plain(value) for name, value in values.items()}
@@ -81,17 +91,42 @@ class ParameterSetter:
 
     def _await(self, followers: list[str], wanted: Mapping[str, Any],
                done: Callable[[str], None]) -> None:
-        """Ask each follower until it has the values."""
-        if not followers:
-            done('')
-            return
+        """Ask one follower after the other, now and then, until it has the values."""
+        request, values = GetParameters.Request(names=list(wanted)), list(wanted.values())
+        end_s, asked = time.monotonic() + PATIENCE_S, Future()
+
+        def ask_next() -> None:
+            nonlocal asked
+            asked = self._getters[followers[0]].call_async(request)
+            asked.add_done_callback(answered)
 
         def answered(future: Future) -> None:
             answer = future.result()
-            known = [] if answer is None else [
-                plain(parameter_value_to_python(value)) for value in answer.values]
-            follow = followers[1:] if known == list(wanted.values()) else followers
-            self._await(follow, wanted, done)
+            if timer is self._timer and answer is not None and values == [
+                    plain(parameter_value_to_python(value)) for value in answer.values]:
+                del followers[0]
+                if followers:
+                    ask_next()
+                else:
+                    end('')
 
-        request = GetParameters.Request(names=list(wanted))
-        self._getters[followers[0]].call_async(request).add_done_callback(answered)
+        def look() -> None:
+            if time.monotonic() > end_s:
+                end(f'{followers[0]} does not follow')
+            elif asked.done():
+                ask_next()
+
+        def end(reason: str) -> None:
+            self._forget()
+            done(reason)
+
+        self._forget()
+        timer = self._timer = self._node.create_timer(
+            ASK_EVERY_S, look, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        ask_next()
+
+    def _forget(self) -> None:
+        """Ask no follower any more."""
+        if self._timer is not None:
+            self._node.destroy_timer(self._timer)
+        self._timer = None
