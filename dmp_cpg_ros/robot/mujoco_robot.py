@@ -277,8 +277,10 @@ class MujocoRobot:
         self._push_force = force
 
     def take_push(self, force: PushForce) -> None:
-        """Let a force act from its time on, for ``HOLD_NS`` or until the next one."""
-        self._pushes.add(force)
+        """Let a force act from its time on, for ``HOLD_NS`` or until the next one; raises
+        DataError as :meth:`~dmp_cpg_ros.core.scenario.push.PushQueue.add`.
+        """
+        self._pushes.add(force, self._tick * self.tick_ns)
 
     @property
     def takers(self) -> dict[str, Callable[[Push], None]]:

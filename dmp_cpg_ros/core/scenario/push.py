@@ -8,6 +8,7 @@ does: whoever falls silent stops pushing. A longer push is renewed.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from math import cos, isfinite, sin
 
@@ -18,6 +19,15 @@ from dmp_cpg_ros.core.maths.rotations import Array, roll_pitch_yaw
 
 HOLD_NS = 100_000_000
 """How long a force acts that is not renewed [ns]."""
+
+LONGEST_PUSH_S = 10.0
+"""Longest push of a scenario [s], which is sent as a whole."""
+
+FARTHEST_NS = round(1e9 * LONGEST_PUSH_S) + 1_000_000_000
+"""How far ahead of the clock the time of a force may be [ns]."""
+
+MOST_WAITING = 1000
+"""Forces that may wait for their time: those of ten pushes of the longest."""
 
 FRAMES = ('base_footprint', 'odom', 'world')
 """Frames of a force: x along the base's heading and z up, or the world's; the simulator,
@@ -106,13 +116,30 @@ class PushQueue:
     def __init__(self) -> None:
         self._waiting: list[PushForce] = []
 
-    def add(self, force: PushForce) -> None:
-        """Take a force; one for the same time replaces an earlier one."""
-        kept = [other for other in self._waiting if other.time_ns != force.time_ns]
-        self._waiting = sorted([*kept, force], key=lambda entry: entry.time_ns)
+    def add(self, force: PushForce, now_ns: int) -> None:
+        """Take a force at a time [ns]; one for the same time as an earlier one replaces it.
+
+        Raises
+        ------
+        DataError
+            If its time is too far ahead, or too many wait; those that wait stay.
+        """
+        waiting, at = self._waiting, force.time_ns
+        if at > now_ns + FARTHEST_NS:
+            raise DataError(f'push: the stamp {at * 1e-9:.3f} s must be at most '
+                            f'{FARTHEST_NS * 1e-9:g} s ahead of the clock, {now_ns * 1e-9:.3f} s')
+        place = bisect_left(waiting, at, key=_time)
+        end = bisect_right(waiting, at, key=_time)
+        if place == end and len(waiting) >= MOST_WAITING:
+            raise DataError(f'push: {MOST_WAITING} forces wait for their time, and no more can')
+        waiting[place:end] = [force]
 
     def due(self, now_ns: int) -> PushForce | None:
         """The newest force whose time has come since the last call, or None."""
-        due = [force for force in self._waiting if force.time_ns <= now_ns]
-        self._waiting = self._waiting[len(due):]
+        count = bisect_right(self._waiting, now_ns, key=_time)
+        due, self._waiting = self._waiting[:count], self._waiting[count:]
         return due[-1] if due else None
+
+
+def _time(force: PushForce) -> int:
+    return force.time_ns

@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.parameters import shown
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import world_overrides
 from dmp_cpg_ros.core.scenario.fault import Fault
-from dmp_cpg_ros.core.scenario.push import FRAMES, LARGEST_MEAN_FORCE, Push
+from dmp_cpg_ros.core.scenario.push import FRAMES, LARGEST_MEAN_FORCE, LONGEST_PUSH_S, Push
 from dmp_cpg_ros.core.suite_parameters import OWNER, SuiteParameters
 
 Command = tuple[float, float, float]
@@ -38,9 +38,6 @@ LONGEST_S = 86400.0
 
 LARGEST_IMPULSE = 1000.0
 """Largest component of an impulse [N s]."""
-
-LONGEST_PUSH_S = 10.0
-"""Longest push [s]."""
 
 COMMAND_PERIOD_NS = 100_000_000
 """Period at which a command is repeated [ns]."""

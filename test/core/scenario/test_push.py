@@ -9,7 +9,15 @@ import pytest
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import JointTargets
-from dmp_cpg_ros.core.scenario.push import HOLD_NS, Push, PushForce, PushQueue
+from dmp_cpg_ros.core.scenario.push import (
+    FARTHEST_NS,
+    HOLD_NS,
+    LONGEST_PUSH_S,
+    MOST_WAITING,
+    Push,
+    PushForce,
+    PushQueue,
+)
 from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS, Scenario, play
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
@@ -47,11 +55,25 @@ def test_the_heading_turns_a_force_and_the_tilt_does_not():
 def test_a_queue_gives_each_force_once_and_of_late_ones_the_newest():
     queue = PushQueue()
     for at in (30, 10, 20):
-        queue.add(PushForce(at, (float(at), 0.0, 0.0)))
+        queue.add(PushForce(at, (float(at), 0.0, 0.0)), 0)
     assert queue.due(5) is None
     assert queue.due(20).force[0] == 20.0
     assert queue.due(20) is None
     assert queue.due(99).force[0] == 30.0
+
+
+def test_the_longest_push_waits_and_no_more_than_some_seconds_and_forces():
+    queue, now = PushQueue(), 1_000_000_000_000
+    *_, last = forces = Push((1.0, 0.0, 0.0), LONGEST_PUSH_S).forces(now, TICK_NS)
+    for force in forces:
+        queue.add(force, now)
+    with pytest.raises(DataError, match='must be at most 11 s ahead of the clock, 1000.000 s'):
+        queue.add(PushForce(now + FARTHEST_NS + 1, (5.0, 0.0, 0.0)), now)
+    with pytest.raises(DataError, match='1000 forces wait'):
+        for at in range(MOST_WAITING):
+            queue.add(PushForce(now + 1 + at, (5.0, 0.0, 0.0)), now)
+    queue.add(PushForce(last.time_ns, (7.0, 0.0, 0.0)), now)  # takes the place of another one
+    assert queue.due(now + FARTHEST_NS).force[0] == 7.0
 
 
 def flying(scenario, ticks):
