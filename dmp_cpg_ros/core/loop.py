@@ -164,7 +164,7 @@ class WalkingLoop:
         self._barring = self.mode.mode
         self.votes = self.voting.step(
             self.votes, state.time_ns, network, vote_sensors(state), x, r,
-            self.stop.state in ('walking', 'free'), self.inbox.take())
+            self.stop.state in ('walking', 'free'), self.inbox.take(self.votes.memory.asks))
         self.stop = self.supervisor.step(
             self.stop, state.time_ns, network, x, x_dot, r, command, self.votes.tally,
             self.mode.mode, feedback.margins, feedback.progress,

@@ -156,7 +156,7 @@ class InhibitionNode(SuiteNode):
             self._body_mode, None, None)
         self._votes = self._voting.step(
             self._votes, stamp_ns, network, _vote_sensors(stamp_ns, values), self._x, self._r,
-            before.state in ('walking', 'free'), self._inbox.take())
+            before.state in ('walking', 'free'), self._inbox.take(self._votes.memory.asks))
         self._state = self._supervisor.step(
             before, stamp_ns, network, self._x, self._x_dot, self._r, self._gate.at(stamp_ns),
             self._votes.tally, self._barring, margins, progress, self.certified.wanted)

@@ -93,7 +93,7 @@ class Oscillators(WalkingLoop):
         self.canon = canon = self.canonical.step(self.canon, self.r, inhibition, dt)
         self.votes = self.voting.step(
             self.votes, self.now_ns, self.network, self._sensors, canon.x, self.r,
-            self.stop.state in ('walking', 'free'), self.inbox.take())
+            self.stop.state in ('walking', 'free'), self.inbox.take(self.votes.memory.asks))
         self.stop = self.supervisor.step(
             self.stop, self.now_ns, self.network, canon.x, canon.x_dot, self.r, command,
             self.votes.tally,

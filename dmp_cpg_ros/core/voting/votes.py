@@ -9,7 +9,7 @@ between a few instants: every change of the gains costs the oscillators a new ti
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 
@@ -29,7 +29,7 @@ ANONYMOUS = 'user'
 """Name of a voter that does not give one."""
 
 MOST_VOTERS = 12
-"""Number of voters from outside."""
+"""Number of voters from outside whose votes are alive."""
 
 FADE_STEPS = 8
 """Number of equal steps in which a vote fades."""
@@ -44,7 +44,7 @@ class VoteInbox:
     def __init__(self) -> None:
         """Start without votes."""
         self._voters: set[str] = set()
-        self._waiting: list[Vote] = []
+        self._waiting: dict[str, tuple[float, ...]] = {}
 
     def accept(self, weights: Mapping[str, float], voter: str = '') -> None:
         """Take a vote; it counts from the next :meth:`take` on.
@@ -76,12 +76,16 @@ class VoteInbox:
             raise DataError(f"'{voter}' is one voter too many; the {MOST_VOTERS} that can vote "
                             f'are {", ".join(sorted(self._voters))}')
         self._voters.add(voter)
-        self._waiting.append((voter, tuple(weights.get(leg, float('nan')) for leg in LEGS)))
+        former = self._waiting.get(voter, (float('nan'),) * len(LEGS))
+        self._waiting[voter] = tuple(map(weights.get, LEGS, former))
 
-    def take(self) -> tuple[Vote, ...]:
-        """Votes since the last call, in the order of their arrival."""
-        waiting, self._waiting = tuple(self._waiting), []
-        return waiting
+    def take(self, alive: Collection[str] = ()) -> tuple[Vote, ...]:
+        """Votes since the last call, one of each voter, in the order of their arrival; who is
+        neither among these voters nor among those whose votes are alive is forgotten.
+        """
+        waiting, self._waiting = self._waiting, {}
+        self._voters = {*waiting, *self._voters.intersection(alive)}
+        return tuple(waiting.items())
 
 
 @dataclass(frozen=True)

@@ -112,8 +112,35 @@ def test_voters_are_limited_in_number_but_not_in_votes() -> None:
         box.accept({'fl': 1.0}, f'voter {i}')
     with pytest.raises(DataError, match='one voter too many'):
         box.accept({'fl': 1.0}, 'late')
-    box.accept({'rr': 0.5}, 'voter 3')
-    assert len(box.take()) == MOST_VOTERS + 1 and box.take() == ()
+    for i in range(100):
+        box.accept({'rr': 0.01 * i}, 'voter 3')
+    box.accept({'rr': 0.5, 'fl': 0.25}, 'voter 3')
+    votes = box.take()
+    assert [voter for voter, _ in votes] == [f'voter {i}' for i in range(MOST_VOTERS)]
+    assert dict(votes)['voter 3'] == pytest.approx((0.25, NAN, NAN, 0.5), nan_ok=True)
+
+
+def test_a_voter_whose_votes_have_faded_makes_room_for_another() -> None:
+    box, memory, fade_ns = VoteInbox(), VoteMemory(), 1_000_000_000
+
+    def tick(time_ns: int) -> None:
+        nonlocal memory
+        for voter, weights in box.take(memory.asks):
+            memory = memory.heard(voter, weights, time_ns)
+        memory = memory.alive(time_ns, fade_ns)
+
+    for i in range(MOST_VOTERS):
+        box.accept({'fl': 1.0}, f'voter {i}')
+    for time_ns in (0, fade_ns // 2):
+        tick(time_ns)
+        with pytest.raises(DataError, match='one voter too many'):
+            box.accept({'fl': 1.0}, 'late')
+        box.accept({'fl': 1.0}, 'voter 3')
+    for time_ns in (fade_ns, fade_ns + 1):
+        tick(time_ns)
+    box.accept({'fl': 1.0}, 'late')
+    tick(fade_ns + 2)
+    assert set(memory.asks) == {'voter 3', 'late'} and box.take() == ()
 
 
 # Sensors -------------------------------------------------------------------------------------
