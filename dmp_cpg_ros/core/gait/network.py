@@ -251,8 +251,8 @@ class GaitNetwork:
         return x
 
     def settled(self, x: Array, r: Array, inhibition: Inhibition) -> Array | None:
-        """Equilibrium (4, 2) near a state under inhibition, by Newton's iteration; None where the
-        gains that act do not hold the legs in their regions C_i.
+        """Equilibrium (4, 2) near a state under inhibition, by Newton's iteration; None where it
+        finds none, or the gains that act do not hold the legs in their regions C_i.
 
         Parameters
         ----------
@@ -265,8 +265,11 @@ class GaitNetwork:
         """
         system, _ = self._frame(inhibition.rest_phase)
         omega, gains = self.omega(r), inhibition.acting_gains(x, system.target)
-        for _ in range(6):
-            x = system.newton_step(x, omega, gains, system.field(x, omega, gains))
+        try:
+            for _ in range(6):
+                x = system.newton_step(x, omega, gains, system.field(x, omega, gains))
+        except np.linalg.LinAlgError:
+            return None
         held = np.array_equal(inhibition.acting_gains(x, system.target), gains)
         return x if held and np.abs(self.rate(x, r, inhibition)).max() <= AT_REST else None
 

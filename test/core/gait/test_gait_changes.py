@@ -13,6 +13,7 @@ from limbless import LimblessLoop, NoBalance
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.changes import certify_changes
 from dmp_cpg_ros.core.errors import ParameterError
@@ -114,6 +115,20 @@ def test_at_rest_a_gait_changes_at_once_and_moves_no_foot(after: str) -> None:
         np.testing.assert_allclose(tick.targets.position, before.targets.position, atol=0.02)
     walker.loop.request(False)
     assert walker.until('walking') < 1.0
+
+
+def test_at_rest_a_gait_without_an_equilibrium_is_not_taken_up(monkeypatch: pytest.MonkeyPatch
+                                                               ) -> None:
+    def singular(*_: object) -> None:
+        raise np.linalg.LinAlgError('Singular matrix')
+
+    walker = Walker(at_rest=True)
+    walker.walk(0.1)
+    walker.loop.change_gait('trot')
+    with monkeypatch.context() as patched:
+        patched.setattr(CanonicalSystem, 'newton_step', singular)
+        assert {tick.gait.name for tick in walker.walk(0.1)} == {'amble'}
+    assert walker.walk(0.1)[-1].gait.name == 'trot'
 
 
 def test_a_gait_asked_for_while_stopping_waits_for_the_rest() -> None:
