@@ -103,7 +103,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._until_ns, self._again_ns, self.refused = -1, 0, 0
         self._lain: Future | None = None
         self.heard = OwnMessages(self, self._warn, lock_step=lock_step)
-        voting = any(action.kind == 'votes' for action in self._actions)
+        voting = any(action.kind == 'votes' and action.value for action in self._actions)
         self._topics = {name: AcknowledgedTopic(self, self.heard, name) for name in (
             'cmd_vel', 'push', *(['votes'] if voting else []))}
         gate = interface(f'{GATE_OWNER}/advance_until')
@@ -217,6 +217,8 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._next += 1
         if action.label and not self._again_ns:
             self._say(self.time_ns * 1e-9, f'> {action.label}')
+        if action.value is None:
+            return self._deliver_due()
         self.busy = True
         self._hand_over(action)
         return True

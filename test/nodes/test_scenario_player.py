@@ -93,6 +93,19 @@ def test_what_is_refused_for_good_ends_the_run_with_the_reason(
     assert REPEATED_NS <= asked[-1] - asked[0] < REPEATED_NS + 2 * REPEAT_NS
 
 
+@pytest.mark.parametrize('lock_step', [False, True])
+def test_the_ends_of_commands_and_votes_are_told(context: None, lock_step: bool) -> None:
+    said: list[str] = []
+    player = ScenarioPlayer(Scenario.from_mapping({'duration': 1.0, 'events': [
+        {'at': 0.1, 'command': 'silence'}, {'at': 0.1, 'votes': {}, 'label': 'no votes'}]},
+        'test'), TICK_NS, lock_step, lambda _, text: said.append(text))
+    player.begin()
+    player._on_gains(gains(100_000_000 - TICK_NS))
+    (player._on_holding if lock_step else player._on_clock)(clock(100_000_000))
+    assert said == ['> silence', '> no votes']
+    assert not player.busy and 'votes' not in player._topics
+
+
 def test_in_lock_step_who_is_restarted_before_it_has_answered_is_asked_again(
         context: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Once its ticks go on; what the one before might still answer does not count."""

@@ -127,13 +127,13 @@ def _gait(value: Any, where: str) -> tuple[str, str]:
     return value, f'gait {value}'
 
 
-def _votes(value: Any, where: str) -> tuple[dict[str, float], str]:
+def _votes(value: Any, where: str) -> tuple[dict[str, float] | None, str]:
     """Read votes for a stop: weights by leg; none end what was voted before."""
     known(value, LEGS, where)
     weights = dict(zip(value, numbers(value.values(), where, f'votes {value}', 0.0, 100.0),
                        strict=True))
     told = ', '.join(f'{leg} {weight:g}' for leg, weight in weights.items())
-    return weights, f'votes {told}' if told else 'no more votes'
+    return (weights, f'votes {told}') if told else (None, 'no more votes')
 
 
 def _push(value: Any, where: str) -> tuple[Push, str]:
@@ -210,7 +210,7 @@ class Action:
         A key of :data:`EVENT_KINDS`.
     value : object
         The event's value: (v_x, v_y, γ) [m/s, m/s, rad/s] of a command, true (stop) or false of
-        inhibit, a name of gait, ...
+        inhibit, a name of gait, ...; None where something ends and nothing is sent.
     label : str
         What to tell the user; empty for repetitions.
     """
@@ -283,7 +283,8 @@ class Scenario:
             if event.kind in LASTING_KINDS:
                 following = [e.at for e in self.events[place + 1:] if e.kind == event.kind]
                 end_ns = round((following or [self.duration_s])[0] * 1e9)
-                times = range(0, max(end_ns - time_ns, 1) if event.value else 0, COMMAND_PERIOD_NS)
+                ends = event.value is None
+                times = range(0, 1 if ends else max(end_ns - time_ns, 1), COMMAND_PERIOD_NS)
             actions += [Action(_tick_after(time_ns + later, tick_ns), event.kind, event.value,
                                '' if later else event.label) for later in times]
         return tuple(sorted(actions, key=lambda action: action.time_ns))
@@ -320,7 +321,8 @@ def play(scenario: Scenario, tick_ns: int, step: Callable[[], Any], takers: Take
             f'nobody takes {", ".join(sorted(missing))}; taken are {", ".join(sorted(takers))}')
     for k in range(scenario.ticks(tick_ns)):
         while place < len(actions) and actions[place].time_ns <= k * tick_ns:
-            takers[actions[place].kind](actions[place].value)
+            if actions[place].value is not None:
+                takers[actions[place].kind](actions[place].value)
             place += 1
         step()
 

@@ -38,8 +38,20 @@ def test_a_command_is_repeated_until_the_next_one_and_silence_is_silent() -> Non
     played = scenario({'at': 0.0, 'command': {'v_x': 0.5}}, {'at': 0.3, 'gait': 'trot'},
                       {'at': 1.0, 'command': 'silence'})
     commands = [action for action in played.timeline(TICK_NS) if action.kind == 'command']
-    assert [action.time_ns for action in commands] == [k * COMMAND_PERIOD_NS for k in range(10)]
+    assert [action.time_ns for action in commands] == [k * COMMAND_PERIOD_NS for k in range(11)]
     assert [action.label for action in commands].count('') == 9
+    assert (commands[-1].value, commands[-1].label) == (None, 'silence')
+
+
+def test_what_ends_is_told_and_nothing_is_sent() -> None:
+    log: list[Any] = []
+    played = scenario({'at': 0.0, 'votes': {'fl': 1.0}}, {'at': 0.004, 'command': 'silence'},
+                      {'at': 0.008, 'votes': {}, 'label': 'enough'}, duration=0.016)
+    assert [action.label for action in played.timeline(TICK_NS)] == [
+        'votes fl 1', 'silence', 'enough']
+    takers = {kind: lambda value, kind=kind: log.append((kind, value)) for kind in EVENT_KINDS}
+    play(played, TICK_NS, lambda: None, takers)
+    assert log == [('votes', {'fl': 1.0})]
 
 
 def test_play_gives_each_kind_to_its_taker_before_the_tick() -> None:
