@@ -104,6 +104,7 @@ def test_the_ends_of_commands_and_votes_are_told(context: None, lock_step: bool)
     (player._on_holding if lock_step else player._on_clock)(clock(100_000_000))
     assert said == ['> silence', '> no votes']
     assert not player.busy and 'votes' not in player._topics
+    player.destroy_node()
 
 
 def test_in_lock_step_who_is_restarted_before_it_has_answered_is_asked_again(
