@@ -238,6 +238,19 @@ def test_a_restarted_node_does_not_wait_longer_for_a_clock_that_is_set_back(
     node.destroy_node()
 
 
+def test_a_memory_that_cannot_be_read_costs_no_tick(ros: Ros) -> None:
+    reference = ReferenceFilter('reference_filter', context=ros.context)
+    canonical = CanonicalOscillators('canonical_oscillators', context=ros.context)
+    for node, inputs in ((reference, {'joint_states': None}), (canonical, {
+            'reference': np.zeros(3)})):
+        node.start()
+        node._memory._kept.append(JointState(name=['nobody']))
+        node.on_tick(TICK, {**inputs, 'inhibition_gains': (TICK, RUNS)})
+        assert node.health.rejected['gait_memory'] == 1
+        assert 'gait_memory' not in [topic.name for topic, _ in node._inputs]
+        node.destroy_node()
+
+
 def test_a_leg_without_feedback_of_the_posture_says_nothing(ros: Ros) -> None:
     _, state, tick = walked(10)
     leg, sent = LegTransformation('leg_transformation_fl', context=ros.context), []

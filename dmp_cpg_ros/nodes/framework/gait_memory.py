@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
+from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.nodes.messages.canonical_state import GaitMemoryReader
 from dmp_cpg_ros.nodes.messages.values import header_ns
@@ -44,8 +45,13 @@ class GaitMemory:
         if self._asked:
             return None
         self._asked = True
-        said = [(stamp_ns - header_ns(message), self._reader.read(message))
-                for message in self._kept]
         if self._heard is not None:
             self._node.leave(self._heard)
-        return next(((1e-9 * age, what) for age, what in said if 0 <= age <= FRESH_NS), None)
+        for message in self._kept:
+            age = stamp_ns - header_ns(message)
+            if 0 <= age <= FRESH_NS:
+                try:
+                    return 1e-9 * age, self._reader.read(message)
+                except DataError as error:
+                    self._node.drop('gait_memory', error)
+        return None
