@@ -51,8 +51,8 @@ canonical system, 0 while it does not move the legs.
 
 GAIN_ROWS = (*LEGS, 'region_radius', 'rest_phase', 'requested', 'at_rest', 'automatic',
              'opposite', 'share', 'quickness')
-"""Of ``inhibition_gains``: α_i [1/s] of each leg, r₀, the phase of fl at rest [rad], and four
-flags that are 0 or 1.
+"""Of ``inhibition_gains``: α_i [1/s] of each leg, r₀, the phase of fl at rest [rad], four flags
+that are 0 or 1, share of the command, and factor on the cadence.
 """
 
 REFERENCE_ROWS = ('v_x', 'v_y', 'gamma')

@@ -40,7 +40,7 @@ class Finding:
     Raises
     ------
     ParameterError
-        If the grade is neither of the two.
+        If the grade is none of the three.
     """
 
     rate: float

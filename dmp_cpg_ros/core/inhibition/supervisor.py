@@ -81,7 +81,7 @@ class GaitSupervisor:
     voting : VotingParameters
         How a stop by votes holds and ends.
     activity_rate : float
-        Rate of the legs' swing activity [1/s].
+        Rate at which the legs' swing activity follows the rates of their oscillators [1/s].
     """
 
     def __init__(self, parameters: InhibitionParameters, voting: VotingParameters,
