@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait, limiting_gaits
-from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
+from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
@@ -279,10 +279,7 @@ class WalkingLoop:
 
     def in_force(self) -> Running:
         """What runs, in the gait in force or in the change between two."""
-        gait = self.canon.gait
-        ends = (gait.transition.before, gait.transition.after) if isinstance(
-            gait, BlendedGait) else (gait,)
-        first, *others = (self._reader.named(end.name) for end in ends)
+        first, *others = (self._reader.named(end.name) for end in self.canon.gait.ends)
         return replace(self._described(self.parameters, first), others=tuple(others))
 
     def _contact_limits(self, dt: float) -> ContactLimits | None:

@@ -265,6 +265,11 @@ class Gait(CycleOfLegs):
         except (TypeError, ValueError) as error:
             raise ParameterError(f"gait '{name}': {error}") from error
 
+    @property
+    def ends(self) -> tuple[Gait, ...]:
+        """The gait itself; of a blend the two that it lies between."""
+        return (self,)
+
     def scaled(self, cadence_scale: float) -> Gait:
         """Return this gait with all cadences multiplied; itself for a factor of 1.
 

@@ -186,7 +186,7 @@ class CanonicalState:
     @property
     def leading_to(self) -> Gait:
         """The gait in force, or the one that the present change leads to."""
-        return self.gait.transition.after if isinstance(self.gait, BlendedGait) else self.gait
+        return self.gait.ends[-1]
 
 
 class RunningGait:

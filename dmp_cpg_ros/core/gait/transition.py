@@ -187,7 +187,12 @@ class BlendedGait(CycleOfLegs):
     @property
     def name(self) -> str:
         """Both names, as ``amble>trot``."""
-        return f'{self.transition.before.name}>{self.transition.after.name}'
+        return '>'.join(end.name for end in self.ends)
+
+    @property
+    def ends(self) -> tuple[Gait, Gait]:
+        """Both gaits."""
+        return self.transition.before, self.transition.after
 
     def scaled(self, cadence_scale: float) -> BlendedGait:
         """Return this blend with this factor on its cadences."""
@@ -234,21 +239,19 @@ class BlendedGait(CycleOfLegs):
 
     def highest(self, scale: BodyScale) -> float:
         """Dimensionless foot speed that is never exceeded on a robot, between those of both."""
-        before, after = self.transition.before, self.transition.after
+        before, after = self.ends
         return blended_limit(before.highest(scale), after.highest(scale), self.weight)
 
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
         """Angular frequency ω at a foot speed, as :meth:`Gait.omega` [rad/s]."""
         foot_speed = min(foot_speed, scale.speed(self.highest(scale)))
-        before, after = self.transition.before, self.transition.after
         return self.cadence_scale * self._blended(
-            before.omega(foot_speed, scale), after.omega(foot_speed, scale))
+            *(end.omega(foot_speed, scale) for end in self.ends))
 
     def duty(self, foot_speed: float, scale: BodyScale) -> float:
         """Duty factor β at a foot speed, as :meth:`Gait.duty`."""
         foot_speed = min(foot_speed, scale.speed(self.highest(scale)))
-        before, after = self.transition.before, self.transition.after
-        return self._blended(before.duty(foot_speed, scale), after.duty(foot_speed, scale))
+        return self._blended(*(end.duty(foot_speed, scale) for end in self.ends))
 
     def own_omegas(self, omega: float) -> list[float]:
         """Frequencies with which the legs go through their cycles, as
@@ -258,7 +261,7 @@ class BlendedGait(CycleOfLegs):
 
     def bounce(self, cycle_position: float, duty: float, omega: float) -> Bounce:
         """How the body is planned to rise and fall, as :meth:`Gait.bounce`."""
-        before, after = self.transition.before, self.transition.after
+        before, after = self.ends
         return before.bounce(cycle_position, duty, omega).mixed(
             after.bounce(cycle_position, duty, omega), self.weight)
 
@@ -276,9 +279,7 @@ def changing_speed(gait: GaitInForce, wanted: Gait, scale: BodyScale) -> float:
     """
     if gait.name == wanted.name:
         return inf
-    ends = (gait.transition.before, gait.transition.after) if isinstance(
-        gait, BlendedGait) else (gait,)
-    return CHANGING * min(each.highest(scale) for each in (*ends, wanted))
+    return CHANGING * min(each.highest(scale) for each in (*gait.ends, wanted))
 
 
 def arcs_between(places: Array, new_places: Array, duty: float, new_duty: float) -> Array:

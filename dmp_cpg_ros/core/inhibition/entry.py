@@ -63,12 +63,9 @@ def eligible_legs(network: GaitNetwork, inhibition: InhibitionParameters) -> tup
     which the gait starts.
     """
     p, gait = network.parameters, network.gait
-    if isinstance(gait, BlendedGait):
-        ends = [gait.transition.before, gait.transition.after]
-        share = gait.transition.fastest(network.change_rate)
-    else:
-        ends, share = [gait], 0.0
-    fastest = max(float(end.cadence.max()) / end.cadence_scale for end in ends)
+    share = (gait.transition.fastest(network.change_rate) if isinstance(gait, BlendedGait)
+             else 0.0)
+    fastest = max(float(end.cadence.max()) / end.cadence_scale for end in gait.ends)
     omega = (2.0 * pi * sqrt(GRAVITY / network.scale.leg_length) * (1.0 + share) * fastest
              * max(gait.cadence_scale, p.cadence_scale))
     return _holding(p, inhibition.inhibition_gain, inhibition.region_radius, omega)

@@ -10,7 +10,6 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.gait.transition import BlendedGait
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
@@ -73,10 +72,7 @@ def operating_range(network: GaitNetwork, inhibition: InhibitionParameters,
 
 def _cadences(network: GaitNetwork, largest: float) -> tuple[Array, Array]:
     """Speeds from 0 to the largest between which ω is linear, and ω there."""
-    gait = network.gait
-    ends = [gait.transition.before, gait.transition.after] if isinstance(
-        gait, BlendedGait) else [gait]
-    knots = np.concatenate([end.speed for end in ends]) * float(
+    knots = np.concatenate([end.speed for end in network.gait.ends]) * float(
         np.sqrt(GRAVITY * network.scale.leg_length))
     between = knots[(knots > 0.0) & (knots < largest)]
     speeds = np.unique(np.concatenate([[0.0], between, [largest]]))

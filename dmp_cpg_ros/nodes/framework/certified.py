@@ -29,7 +29,7 @@ from dmp_cpg_ros.core.gait.running import (
     RunningGait,
     limiting_gaits,
 )
-from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
+from dmp_cpg_ros.core.gait.transition import GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.parameters import typed
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.reference.governor import Governor
@@ -137,9 +137,7 @@ class Certified:
         """What runs in a gait in force, or in a change between two."""
         if gait.name == self._accepted[suite.GaitParameters].gait:
             return self._running(self._accepted)
-        ends = (gait.transition.before, gait.transition.after) if isinstance(
-            gait, BlendedGait) else (gait,)
-        return self._running(self._accepted, [end.name for end in ends])
+        return self._running(self._accepted, [end.name for end in gait.ends])
 
     def report(self) -> None:
         """Say on ``/diagnostics`` whether the accepted parameters are certified."""
