@@ -21,7 +21,13 @@ from rclpy.subscription import Subscription
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.nodes.framework.writer_watch import WriterWatch
-from dmp_cpg_ros.nodes.framework.writers import LOOK_EVERY_S, Publishers, is_ticked, only_taken
+from dmp_cpg_ros.nodes.framework.writers import (
+    LOOK_EVERY_S,
+    Publishers,
+    is_ticked,
+    only_taken,
+    with_number,
+)
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader, serialized_stamp
 from dmp_cpg_ros.nodes.messages.interfaces import READER_DEPTH, Interface
 from dmp_cpg_ros.suite_table import KINDS
@@ -64,13 +70,10 @@ class OwnMessages:
             lock_step=self._lock_step), topic)
 
         def receive(data: Any, information: Any = None) -> None:
-            if information is None:  # the events executor hands both over as one
-                data, information = data
-            number, now_ns = _numbered(information)
+            data, number, now_ns = with_number(data, information)
             with suppress(DataError):
                 stamp_ns = serialized_stamp(data) if ticked else 0
                 if not watch.may_admit(number, stamp_ns, now_ns):
-                    watch.refuse(number, now_ns)
                     self._name(topic, only_taken)
                     return
                 message = read(data)  # only what can be read makes its sender the writer
@@ -96,7 +99,7 @@ class OwnMessages:
             partial(self._publishers.may_take_over, topic), most_lost=inf), topic)
 
         def admits(stamp_ns: int, information: Mapping[str, Any]) -> bool:
-            number, now_ns = _numbered(information)
+            _, number, now_ns = with_number(None, information)
             own = watch.admits(number, stamp_ns, now_ns)
             if not own:
                 self._name(topic, only_taken)
@@ -132,8 +135,3 @@ def _all_taken(topic: Interface, who: str) -> str:
     """Where a stranger was there before the writer of a topic was heard."""
     return (f'{topic.name} is published by {who} too; nothing tells their messages from those of '
             f'{" and ".join(topic.publishers)}')
-
-
-def _numbered(information: Mapping[str, Any]) -> tuple[int | None, int]:
-    """Number of a message among those of its publisher, and when it was received [ns]."""
-    return information['publication_sequence_number'], information['received_timestamp']

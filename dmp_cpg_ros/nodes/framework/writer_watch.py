@@ -132,13 +132,18 @@ class WriterWatch:
         return self._last > 0
 
     def may_admit(self, number: int | None, stamp_ns: int, now_ns: int) -> bool:
-        """Whether :meth:`admits` can be true: False for most of what is not the writer's."""
-        return (number is None or now_ns - self._heard_ns > SILENT_NS
-                or self._is_repeat(number - self._last, stamp_ns - self._stamp_ns)
-                or self._continues(number - self._last, stamp_ns - self._stamp_ns, now_ns))
+        """Whether :meth:`admits` can be true: False for most of what is not the writer's, which
+        need not be read then, and is noted.
+        """
+        may = (number is None or now_ns - self._heard_ns > SILENT_NS
+               or self._is_repeat(number - self._last, stamp_ns - self._stamp_ns)
+               or self._continues(number - self._last, stamp_ns - self._stamp_ns, now_ns))
+        if not may:
+            self.refuse(number, now_ns)
+        return may
 
     def refuse(self, number: int | None, now_ns: int) -> None:
-        """Note a message that :meth:`may_admit` has refused: the next number is its sender's."""
+        """Note a stranger's message: the next number is its sender's."""
         if number is not None and not self._ticked:
             self._tried, self._stranger, self._stranger_ns = (0, 0, 0), number, now_ns
 

@@ -9,7 +9,7 @@ writer from those of others, and the graph tells who these are.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any
@@ -79,6 +79,16 @@ class Publishers:
         return known
 
 
+def with_number(message: Any, information: Mapping[str, Any] | None
+                ) -> tuple[Any, int | None, int]:
+    """A message, its number among those of its publisher, and when it was received [ns], from
+    what an executor hands to a callback: the events executor hands both over as one.
+    """
+    if information is None:
+        message, information = message
+    return message, information['publication_sequence_number'], information['received_timestamp']
+
+
 def is_ticked(topic: Interface) -> bool:
     """Whether a topic has one stamped message for every tick; else one for every change."""
     return not topic.latched and (topic.type is Clock or hasattr(topic.type(), 'header'))
@@ -143,14 +153,9 @@ class TopicWriters:
         def receive(data: Any, information: Any = None) -> None:
             if not (node.active or latched):
                 return
-            if information is None:  # the events executor hands both over as one
-                data, information = data
-            number, now_ns = (information['publication_sequence_number'],
-                              information['received_timestamp'])
+            data, number, now_ns = with_number(data, information)
             stamp_ns = serialized_stamp(data) if ticked else 0
             if not any(watch.may_admit(number, stamp_ns, now_ns) for watch in watches):
-                for entry in watches:
-                    entry.refuse(number, now_ns)
                 self._refuse(topic)
                 return
             if ticked and not lock_step and time.time_ns() > now_ns + STALE_NS:
@@ -170,9 +175,8 @@ class TopicWriters:
 
         def receive(message: Any, information: Any = None) -> None:
             nonlocal former, changed_s
-            if information is None:  # as in only
-                message, information = message
-            number = information['publication_sequence_number'] or 0
+            message, number, _ = with_number(message, information)
+            number = number or 0
             if number <= former:  # larger steps are losses
                 now_s, then_s = time.monotonic(), changed_s
                 changed_s = now_s
