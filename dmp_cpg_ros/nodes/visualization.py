@@ -20,6 +20,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.maths.vec3 import upward
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive
@@ -102,9 +103,7 @@ class Visualization(SuiteNode):
         up = np.array((0.0, 0.0, 1.0))
         if 'odom' in values:
             stamp_ns, motion = values['odom']
-            x, y, z, w = motion.quaternion.tolist()
-            up = np.array((2.0 * (x * z - w * y), 2.0 * (y * z + w * x),
-                           1.0 - 2.0 * (x * x + y * y)))
+            up = np.array(upward(motion.quaternion.tolist()))
             self._follow(stamp_ns, motion)
         stamp_ns, feedback = values.get('posture_feedback', (self._stamp_ns, None))
         if stamp_ns == self._stamp_ns:
