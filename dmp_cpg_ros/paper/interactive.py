@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait
-from dmp_cpg_ros.core.inhibition.prediction import look_ahead
+from dmp_cpg_ros.core.inhibition.prediction import look_ahead, ticks_ahead
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 from dmp_cpg_ros.core.reference.governor import Governor
@@ -121,6 +121,8 @@ class Page:
         canon, r = canonical.initial_state(gait, p.inhibition), np.array(COMMAND)
         state = supervisor.initial_state(leg=p.canonical.first_leg)
         inhibition = supervisor.inhibition(state)
+        ticks = ticks_ahead(
+            supervisor, reference, canonical, state, inhibition, canon, r, COMMAND, dt)
         frames: list[dict[str, Any]] = []
         told: dict[str, Any] = {}
         k, end = 0, round(WALKED / dt)
@@ -129,22 +131,19 @@ class Page:
             while begun < 0 or k < end:
                 if k == end:
                     state, begun = supervisor.request(state, request), k
-                    predicted = look_ahead(supervisor, reference, canonical, state, inhibition,
-                                           canon, r, COMMAND, dt, PATIENCE)
+                    now = (supervisor, reference, canonical, state, inhibition, canon, r,
+                           COMMAND, dt)
+                    predicted, ticks = look_ahead(*now, PATIENCE), ticks_ahead(*now)
                     end += round(PATIENCE / dt)
                 k += 1
-                r = reference.towards(r, COMMAND, inhibition, dt)
-                canon = canonical.step(canon, r, inhibition, dt)
-                network = canonical.network(canon.gait)
-                state = supervisor.step(state, round(k * dt * 1e9), network, canon.x,
-                                        canon.x_dot, r, COMMAND)
-                inhibition = supervisor.inhibition(state)
+                state, inhibition, canon, r = next(ticks)
                 if begun >= 0 and not done and state.state in (wanted, 'free'):
                     done, measured, end = True, (k - begun) * dt, k + round(after / dt)
                 if k % EVERY == 0:
                     frames.append({
                         'time': k * dt, 'state': state.state, 'x': canon.x.tolist(),
-                        'places': network.target_at(inhibition.rest_phase).tolist(),
+                        'places': canonical.network(canon.gait).target_at(
+                            inhibition.rest_phase).tolist(),
                         'gains': inhibition.gains.tolist(), 'speed': float(np.hypot(*r[:2]))})
             told['stop' if request else 'start'] = {
                 'time': begun * dt, 'predicted': finite(predicted.time_s), 'measured': measured}

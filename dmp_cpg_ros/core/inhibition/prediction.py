@@ -11,6 +11,7 @@ instant of the request (``study_stops --random``, doc/walking.md).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import ceil, hypot, inf, nan
 from typing import NamedTuple
 
@@ -100,22 +101,42 @@ def look_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical
     body_mode : str
         What the body does, assumed to stay.
     """
-    tick_ns, start_ns, inhibition = round(dt * 1e9), state.time_ns, published
     down_s, way_m, speed = 0.0, 0.0, hypot(r[0], r[1])
-    for k in range(1, ceil(horizon / dt) + 1):
-        r = reference.towards(r, command, inhibition, dt)
-        canon = canonical.step(canon, r, inhibition, dt)
-        network = canonical.network(canon.gait)
-        state = supervisor.step(state, start_ns + k * tick_ns, network, canon.x, canon.x_dot, r,
-                                command, body_mode=body_mode)
-        inhibition = supervisor.inhibition(state)
+    ticks = ticks_ahead(supervisor, reference, canonical, state, published, canon, r, command, dt,
+                        body_mode)
+    for k, (state, _, canon, r) in zip(range(1, ceil(horizon / dt) + 1), ticks, strict=False):
         if state.requested:
             way_m += dt * hypot(r[0], r[1])
-            if _up(canon, state, network.gait.pace(r, network.scale)[3]):
+            if _up(canon, state, canon.gait.pace(r, canonical.scale)[3]):
                 down_s = k * dt
         if state.state in ('at_rest', 'walking', 'free', 'stepping'):
             return Outlook(k * dt, down_s if state.requested else nan, way_m, speed)
     return Outlook(inf, nan, nan, speed)
+
+
+def ticks_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
+                state: SupervisorState, published: Inhibition, canon: CanonicalState, r: Array,
+                command: tuple[float, float, float], dt: float, body_mode: str = 'standing'
+                ) -> Iterator[tuple[SupervisorState, Inhibition, CanonicalState, Array]]:
+    """Oscillators, reference and state of the stop tick by tick, without end; the parameters are
+    those of :func:`look_ahead`.
+
+    Yields
+    ------
+    state : SupervisorState
+    inhibition : Inhibition
+        What acts at the next tick.
+    canon : CanonicalState
+    r : ndarray (3,)
+    """
+    tick_ns, inhibition = round(dt * 1e9), published
+    while True:
+        r = reference.towards(r, command, inhibition, dt)
+        canon = canonical.step(canon, r, inhibition, dt)
+        state = supervisor.step(state, state.time_ns + tick_ns, canonical.network(canon.gait),
+                                canon.x, canon.x_dot, r, command, body_mode=body_mode)
+        inhibition = supervisor.inhibition(state)
+        yield state, inhibition, canon, r
 
 
 def _up(canon: CanonicalState, state: SupervisorState, duty: float) -> bool:
