@@ -26,11 +26,8 @@ from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.inhibition.handover import SilentStop
-from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import CANONICAL, CertificateParameters
-from dmp_cpg_ros.core.transformation.leg import LegParameters
-from dmp_cpg_ros.core.voting.parameters import VotingParameters
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
 from dmp_cpg_ros.nodes.framework.gait_memory import GaitMemory
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
@@ -127,10 +124,8 @@ class CanonicalOscillators(SuiteNode):
                 self.clear('inhibition')
         else:
             if self._silent is None:
-                of = self.parameters_of
-                self._silent = SilentStop(GaitSupervisor(
-                    of(InhibitionParameters), of(VotingParameters),
-                    of(LegParameters).activity_rate), self._inhibition, stamp_ns)
+                self._silent = SilentStop(
+                    self.certified.supervisor(), self._inhibition, stamp_ns)
                 self.warn('inhibition', 'inhibition is silent: the gait stops until it is back',
                           error=True)
             known_ns, self._inhibition = stamp_ns, self._silent.inhibition

@@ -23,7 +23,6 @@ from dmp_cpg_ros.core.inhibition.handover import adopted
 from dmp_cpg_ros.core.inhibition.prediction import look_ahead
 from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
-from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -136,8 +135,7 @@ class InhibitionNode(SuiteNode):
 
     def _build(self) -> None:
         of = self.parameters_of
-        self._supervisor = GaitSupervisor(
-            of(InhibitionParameters), of(VotingParameters), of(LegParameters).activity_rate)
+        self._supervisor = self.certified.supervisor()
         self._voting = Voting(of(InhibitionParameters), of(VotingParameters),
                               of(VoteSourceParameters), of(ReferenceParameters), self._weight)
         self._reference = self.certified.reference()

@@ -16,7 +16,7 @@ from math import nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dmp_cpg_ros.core import suite_parameters as suite
-from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates import gate
 from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.errors import ParameterError
@@ -30,10 +30,12 @@ from dmp_cpg_ros.core.gait.running import (
     limiting_gaits,
 )
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters, GaitInForce
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.parameters import typed
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.reference.governor import Governor
-from dmp_cpg_ros.core.transformation.leg import body_scale
+from dmp_cpg_ros.core.transformation.leg import LegParameters, body_scale
+from dmp_cpg_ros.core.voting.parameters import VotingParameters
 from dmp_cpg_ros.nodes.framework.gaits import description_of, known_gaits
 from dmp_cpg_ros.nodes.framework.judging import Step, beside_ticks
 from dmp_cpg_ros.nodes.framework.parameter_follower import ParameterFollower
@@ -295,6 +297,12 @@ class Certified:
         of = self._node.parameters_of
         return RunningGait(of(CanonicalParameters), self._scale, self.gaits,
                            of(GaitChangeParameters), of(GaitChoiceParameters), quarter)
+
+    def supervisor(self) -> GaitSupervisor:
+        """What stops and starts the gait."""
+        of = self._node.parameters_of
+        return GaitSupervisor(
+            of(InhibitionParameters), of(VotingParameters), of(LegParameters).activity_rate)
 
     def commands(self) -> CommandGate:
         """What comes on ``cmd_vel``, limited."""
