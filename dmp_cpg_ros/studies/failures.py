@@ -176,19 +176,23 @@ class FailingWalk:
 
 @cache
 def walking(gait: str, robot: str, speed: float) -> FailingWalk:
-    """A robot that walks; to be copied."""
+    """A robot that walks, with an injector that knows the last of it only; to be copied."""
     walk = FailingWalk(gait, robot)
     walk.run(STANDS_S)
     walk.loop.request(False)
     walk.follow(speed, WALKS_S)
+    walk.injector = FaultInjector()
+    walk.follow(speed, LAST_S)
     return walk
 
 
 def trial(case: Case) -> Outcome:
     """Let a component fail."""
-    walk = deepcopy(walking(case.gait, case.robot, case.speed))
-    walk.injector = FaultInjector(case.seed)
-    walk.follow(case.speed, LAST_S + case.later_s)
+    before = walking(case.gait, case.robot, case.speed)
+    kept = (before.robot.model, before.robot.description)
+    walk = deepcopy(before, {id(part): part for part in kept})
+    walk.injector.seed(case.seed)
+    walk.follow(case.speed, case.later_s)
     walk.injector.add(Fault(case.component, case.kind, case.fails_s,
                             case.leg if case.component in PLACED else ''), walk.state.time_ns)
     fell = walk.follow(case.speed, case.fails_s + AFTER_S)

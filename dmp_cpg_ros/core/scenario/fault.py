@@ -139,12 +139,16 @@ class FaultInjector:
     """
 
     def __init__(self, seed: int = 0) -> None:
-        self._random = np.random.default_rng((seed, 77))
+        self.seed(seed)
         self._acting: list[_Acting] = []
         self._states: deque[RobotState] = deque(maxlen=512)
         self._sent: dict[str, deque[Message]] = {leg: deque(maxlen=512) for leg in LEGS}
         self._targets: deque[tuple[int, JointTargets]] = deque(maxlen=512)
         self._now = 0
+
+    def seed(self, seed: int) -> None:
+        """Begin anew with what is garbage and what is intermittent."""
+        self._random = np.random.default_rng((seed, 77))
 
     def add(self, fault: Fault, now_ns: int | None = None) -> None:
         """Let a component fail from a time on [ns], that of the last state by default."""
