@@ -6,6 +6,8 @@ To import rclpy, its messages, NumPy and MuJoCo takes most of a node's start. Te
 forked pay it once; nothing of ROS runs yet where they are forked. Only the tracer that ROS 2 is
 linked with, LTTng, has threads from the first import on, and is told of every fork.
 
+A ``walk`` that was forked, as tests do, has imported all of it, and forks its own server.
+
 Run as a program, ``PARENT SOCKET PADDING``, it is that process. What it forks becomes a child of
 its parent (``PR_SET_CHILD_SUBREAPER`` of prctl(2)), which waits for it as for any other, and ends
 with that parent, in whatever way it ends. Linux only.
@@ -95,6 +97,10 @@ class Forked:
         self.send_signal(signal.SIGKILL)
 
 
+_at_hand: list[tuple[Forked, socket.socket]] = []
+"""Server of a process that was forked itself, until it is taken."""
+
+
 class ForkServer:
     """Forks processes that run executables of this package; a context manager.
 
@@ -102,8 +108,13 @@ class ForkServer:
     """
 
     def __init__(self, folder: str | None = None) -> None:
-        """Start the server, in a working folder."""
+        """Start the server, in a working folder, or take the one at hand."""
         _prctl(PR_SET_CHILD_SUBREAPER, 1)
+        self._server: subprocess.Popen[bytes] | Forked
+        if _at_hand and folder is None:
+            self._server, self._socket = _at_hand.pop()
+            self._socket.settimeout(ANSWERS_WITHIN_S)
+            return
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.settimeout(ANSWERS_WITHIN_S)
         with theirs:
@@ -169,10 +180,7 @@ def _prctl(option: int, value: int | bytes) -> None:
 
 def _serve(parent: int, requests: socket.socket) -> None:
     """Fork for every request until there are no more; returns in what was forked, ready to run."""
-    _show([sys.executable, *sys.argv[:2]])  # without the padding
-    _prepare()
-    gc.collect()
-    gc.freeze()  # the collector of a child would otherwise write to, and so copy, all of it
+    _show([sys.executable, __file__, str(parent)])  # without the padding
     while True:
         message, files, _, _ = socket.recv_fds(requests, MOST_BYTES, 2)
         if not message:
@@ -214,6 +222,23 @@ def _prepare() -> None:
     # rclpy names the line of a log message; for its first one it looks through all modules.
     inspect.getframeinfo(sys._getframe())
     _tell_tracer()
+    gc.collect()
+    gc.freeze()  # the collector of a child would otherwise write to, and so copy, all of it
+
+
+def _fork_server() -> None:
+    """Fork a server for this process, which has not begun yet; returns in what that forks, too."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    parent, server = os.getpid(), os.fork()
+    if server:
+        theirs.close()
+        from dmp_cpg_ros.commands import fork_server  # which this program is not
+
+        fork_server._at_hand.append((fork_server.Forked(server), ours))
+    else:
+        ours.close()
+        os.setsid()
+        _serve(parent, theirs)
 
 
 def load_type_supports() -> None:
@@ -289,5 +314,8 @@ def _show(words: Sequence[str]) -> None:
 
 if __name__ == '__main__':
     sys.path[0] = str(Path(__file__).parents[2])  # and not what lies in the working folder
+    _prepare()
     _serve(int(sys.argv[1]), socket.socket(fileno=int(sys.argv[2])))
+    if sys.argv[0] == 'walk':
+        _fork_server()
     sys.exit(import_module('dmp_cpg_ros.__main__').run(sys.argv[0]))

@@ -16,12 +16,14 @@ import pytest
 pytest.importorskip('rclpy')
 
 import ros_processes
+from ros_processes import Processes
 
 from dmp_cpg_ros.commands import fork_server
 from dmp_cpg_ros.commands.fork_server import Forked, ForkServer
 
-ros_domain = ros_processes.ros_domain
+processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 WAIT_S = ros_processes.DEADLINE_S
+WALKING = '{name: walking, duration: 600.0, events: [{at: 0.1, command: {v_x: 0.3}}]}'
 NODE = ('leg_transformation', '--ros-args', '-p', 'leg:=fl', '-p', 'autostart:=false')
 
 
@@ -79,6 +81,23 @@ def test_it_does_what_its_command_does_alone(server: ForkServer, tmp_path: Path)
 def test_what_it_prepares_for_nodes_is_there() -> None:
     fork_server.load_type_supports()
     fork_server.read_own_files()
+
+
+def test_a_walk_that_was_forked_has_a_server_that_was(
+        processes: Processes, tmp_path: Path) -> None:
+    """Its environment is the one with which the program was started that has imported all."""
+    def started_with(pid: int) -> bytes:
+        return Path(f'/proc/{pid}/environ').read_bytes()
+
+    process = processes.walk(WALKING, tmp_path / 'run', '--lock-step',
+                             '--composed', '--respawn', '--rate', str(ros_processes.SHARED_HZ))
+    process.wait_for_output('  walking\n', ros_processes.RUN_S)
+    children = Path(f'/proc/{process.pid}/task/{process.pid}/children').read_text('utf-8').split()
+    of_walk = [child for child in map(int, children) if started_with(child) == started_with(
+        process.pid)]
+    assert len(of_walk) == len(children) == 3  # the suite, its recorder and the server
+    process.interrupt()
+    assert process.wait(ros_processes.RUN_S) == 130, process
 
 
 def test_a_server_that_has_ended_says_so() -> None:

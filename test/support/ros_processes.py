@@ -37,6 +37,7 @@ from rclpy.task import Future
 
 from dmp_cpg_ros import __file__ as package
 from dmp_cpg_ros.commands.fork_server import Forked, ForkServer
+from dmp_cpg_ros.commands.fork_server import __file__ as fork_server_file
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 
@@ -51,6 +52,9 @@ RUN_S = 240.0
 
 MARK = 'DMP_CPG_ROS_TEST'
 """Variable by which the processes of a test, and theirs, are known."""
+
+FORK_SERVER = fork_server_file.encode()
+"""What forks executables; the process for which it does so is the next word of their command."""
 
 SHARED_HZ = 100.0
 """Control rate of a suite beside which tests ask, command and look on; it is certified too."""
@@ -231,12 +235,17 @@ class Processes:
             wait_until(lambda: not self._kill_the_marked(), what=lambda: 'the end of them all')
 
     def _kill_the_marked(self) -> bool:
-        """Kill every process with this environment; whether there was one."""
+        """Kill every process with this environment, or forked for one that was started; whether
+        there was one.
+        """
         mark, found = f'{MARK}={self._mark}'.encode(), False
+        parents = {str(process.pid).encode() for process in self._started}
         for folder in Path('/proc').glob('[0-9]*'):
             # Not ours, or gone; what has ended but is not yet waited for has an empty environment.
             with contextlib.suppress(OSError):
-                if mark in (folder / 'environ').read_bytes().split(b'\0'):
+                words = (folder / 'cmdline').read_bytes().split(b'\0')
+                forked = words[1:2] == [FORK_SERVER] and parents & set(words[2:3])
+                if forked or mark in (folder / 'environ').read_bytes().split(b'\0'):
                     os.kill(int(folder.name), signal.SIGKILL)
                     found = True
         return found
