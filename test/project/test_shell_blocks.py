@@ -21,7 +21,7 @@ pytest.importorskip('rclpy')
 from checkout import ROOT, needs_make, recipe
 from demonstrations import straight_reach
 from ros_processes import SHARED_HZ, NodeProcess, Processes, reserved_domain
-from test_readme import DOCUMENTS, blocks, commands
+from test_readme import DOCUMENTS, TRANSCRIPTS, blocks, commands, transcript
 
 from dmp_cpg_ros import __file__ as package
 from dmp_cpg_ros.configuration import find_config
@@ -42,6 +42,11 @@ report is seen in ``make demo``.
 LIGHT = (*SHORT, '--rate', str(SHARED_HZ))
 """Options of all walks but the bare ``walk`` of the README, which has the usual rate: the machine
 has less to do, and what they show is the same.
+"""
+
+BESIDE = {'stand_by.yaml', '--view'}
+"""Words of walks that others look at or command, in real time. All others but the bare ``walk``
+are typed with ``--lock-step``, in which nobody waits for the robot, and it need not lie down.
 """
 
 SPREAD = {'--composed', '--respawn'}
@@ -182,8 +187,10 @@ class Reader:
 
     def options(self, words: list[str]) -> list[str]:
         """Options that are typed with those of a walk."""
-        light = LIGHT if words or not self.usual_rate else SHORT
-        return [*light, *(['--composed'] if words and not SPREAD & set(words) else [])]
+        if self.usual_rate and not words:
+            return [*SHORT]
+        return [*LIGHT, *(['--composed'] if words and not SPREAD & set(words) else []),
+                *([] if BESIDE & set(words) else ['--lock-step'])]
 
     def make(self, words: list[str]) -> None:
         """Run what ``make`` would run, in the reader's folder, in one process; as LIGHT says."""
@@ -229,19 +236,26 @@ BLOCKS = {name: block for name, block in ALL.items() if not any(
 """Those with a command of their own: a page may begin as the README does."""
 
 
+SHOWN = {line for document in TRANSCRIPTS for command, _ in transcript(document)
+         for line in [shlex.join(commands(command)[0])]}
+"""Commands that ``test_readme_transcripts.py`` types, and looks at what they print."""
+
+
 def to_type(name: str) -> list[str]:
-    """Commands of a block without the walks that the block of another name before it has, too,
-    unless they are for the client that comes next.
+    """Commands of a block without those that are shown, and the walks that the block of another
+    name before it has, too, unless they are for the client that comes next.
     """
     lines, names = typed(BLOCKS[name]), list(BLOCKS)
     before = {line for other in names[:names.index(name)] for line in typed(BLOCKS[other])}
-    return [line for line, following in zip(lines, [*lines[1:], ''], strict=True)
-            if not line.startswith('walk') or line not in before or following.startswith(CLIENTS)]
+    client = [following.startswith(CLIENTS) and following not in SHOWN
+              for following in [*lines[1:], '']]
+    return [line for line, asked in zip(lines, client, strict=True)
+            if asked or line not in SHOWN and not (line.startswith('walk') and line in before)]
 
 
 def test_every_command_is_typed() -> None:
     """And those with which several blocks begin, once."""
-    assert {line for name in BLOCKS for line in to_type(name)} == {
+    assert {line for name in BLOCKS for line in to_type(name)} | SHOWN >= {
         line for block in ALL.values() for line in typed(block)}
 
 
