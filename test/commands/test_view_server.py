@@ -30,7 +30,7 @@ class Served:
         self.frames, self.taken = Frames(), list[Any]()
         self.scene = b''
         self.server = ViewServer(TOKEN, self.frames, lambda: self.scene, self.take)
-        threading.Thread(target=self.server.serve_forever, daemon=True).start()
+        threading.Thread(target=self.server.serve_forever, args=(0.01,), daemon=True).start()
 
     def take(self, command: Any) -> dict[str, Any]:
         if command == 'bad':
