@@ -105,7 +105,14 @@ class ForkServer:
     """Forks processes that run executables of this package; a context manager.
 
     It imports while this process goes on, and ends with :meth:`close`; what it has forked goes on.
+
+    Attributes
+    ----------
+    program : str
+        File of a program that calls :func:`main`.
     """
+
+    program = __file__
 
     def __init__(self, folder: str | None = None) -> None:
         """Start the server, in a working folder, or take the one at hand."""
@@ -120,7 +127,7 @@ class ForkServer:
         with theirs:
             self._server = subprocess.Popen(
                 [sys.executable, '-W', 'ignore::DeprecationWarning:__main__',  # of the tracer
-                 __file__, str(os.getpid()), str(theirs.fileno()), ' ' * TITLE_BYTES],
+                 self.program, str(os.getpid()), str(theirs.fileno()), ' ' * TITLE_BYTES],
                 stdin=subprocess.DEVNULL, start_new_session=True, cwd=folder,
                 pass_fds=(theirs.fileno(),), env={**OWN, **os.environ})
 
@@ -312,10 +319,15 @@ def _show(words: Sequence[str]) -> None:
             ctypes.memmove(begin, shown.ljust(end - begin, b'\0'), end - begin)
 
 
-if __name__ == '__main__':
+def main() -> int:
+    """Be the program; returns the exit status of what it has forked."""
     sys.path[0] = str(Path(__file__).parents[2])  # and not what lies in the working folder
     _prepare()
     _serve(int(sys.argv[1]), socket.socket(fileno=int(sys.argv[2])))
     if sys.argv[0] == 'walk':
         _fork_server()
-    sys.exit(import_module('dmp_cpg_ros.__main__').run(sys.argv[0]))
+    return int(import_module('dmp_cpg_ros.__main__').run(sys.argv[0]))
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -95,7 +95,7 @@ def test_a_walk_that_was_forked_has_a_server_that_was(
     children = Path(f'/proc/{process.pid}/task/{process.pid}/children').read_text('utf-8').split()
     of_walk = [child for child in map(int, children) if started_with(child) == started_with(
         process.pid)]
-    assert len(of_walk) == len(children) == 3  # the suite, its recorder and the server
+    assert len(of_walk) == len(children) == 3  # the suite, the recorder and the server
     process.interrupt()
     assert process.wait(ros_processes.RUN_S) == 130, process
 

@@ -29,6 +29,7 @@ from typing import Any
 import pytest
 import rclpy
 import yaml
+from fork_server_of_tests import TestServer
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -36,7 +37,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from dmp_cpg_ros import __file__ as package
-from dmp_cpg_ros.commands.fork_server import Forked, ForkServer
+from dmp_cpg_ros.commands.fork_server import Forked
 from dmp_cpg_ros.commands.fork_server import __file__ as fork_server_file
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
@@ -162,9 +163,9 @@ class NodeProcess:
 
 
 @cache
-def fork_server() -> ForkServer:
+def fork_server() -> TestServer:
     """Fork server of this process, from which executables start in a tenth of the time."""
-    server = ForkServer(TESTS)
+    server = TestServer(TESTS)
     atexit.register(server.close)
     return server
 

@@ -1,0 +1,31 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Fork server of the tests, which start hundreds of commands, each walk in a domain of its own.
+
+Run as a program it is that server. It has imported what commands need after a walk and beside it,
+too, and its walks look for others in the graph for as long as discovery takes on one machine.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from dmp_cpg_ros.commands import (  # noqa: F401
+    analyze,
+    fork_server,
+    live_view,
+    robot_client,
+    suite_domain,
+)
+
+LOOK_S = 0.2
+
+
+class TestServer(fork_server.ForkServer):
+    __test__ = False
+    program = __file__
+
+
+if __name__ == '__main__':
+    suite_domain.LOOK_S = LOOK_S
+    sys.exit(fork_server.main())
