@@ -36,6 +36,7 @@ from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.paper.jacobians import Array, Field
 
 _MOST_PERIODS = 200
+_MOST_STEPS = 100_000
 _SETTLED = 1e-7
 _NEUTRAL = 1e-6  # decay per period that the integration cannot tell from none
 
@@ -98,9 +99,10 @@ def find_orbit(field: Field, start: ArrayLike, transient: float, step: float,
         return float((at - x) @ normal) if distance < 0.1 * farthest else -1.0
 
     height.direction, height.terminal = 1.0, True  # type: ignore[attr-defined]
-    returned = _flow(field, x, 1e5 * step, step, events=height).t_events[0]
+    returned = _flow(field, x, _MOST_STEPS * step, step, events=height).t_events[0]
     if not returned.size:
-        raise DataError('the state did not come back to where it was within 100,000 steps')
+        raise DataError('the state did not come back to where it was within '
+                        f'{_MOST_STEPS:,} steps')
     period = float(returned[0])
     states = _flow(field, x, period, step, np.linspace(0.0, period, count + 1)).y.T
     gap = float(np.linalg.norm(states[-1] - x))

@@ -9,6 +9,7 @@ import pytest
 
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.paper import transverse_metric as transverse_metric_module
 from dmp_cpg_ros.paper.jacobians import numerical_jacobian
 from dmp_cpg_ros.paper.transverse_metric import Orbit, find_orbit, floquet_rate, transverse_metric
 
@@ -76,7 +77,8 @@ def test_a_larger_share_of_the_rate_is_given_back_as_contraction() -> None:
     assert rates[0] < 4.0 + 1e-6 and all(rate > 0.5 for rate in rates)
 
 
-def test_orbits_that_do_not_attract_or_do_not_close_are_refused() -> None:
+def test_orbits_that_do_not_attract_or_do_not_close_are_refused(
+        monkeypatch: pytest.MonkeyPatch) -> None:
     angles = np.linspace(0.0, 2.0 * np.pi, 200, endpoint=False)
     circle = Orbit(np.stack([np.cos(angles), -np.sin(angles)], axis=1), 2.0 * np.pi)
 
@@ -85,5 +87,6 @@ def test_orbits_that_do_not_attract_or_do_not_close_are_refused() -> None:
 
     with pytest.raises(DataError, match='do not decay'):
         transverse_metric(centre, lambda x: np.array([[0.0, 1.0], [-1.0, 0.0]]), circle)
-    with pytest.raises(DataError):
+    monkeypatch.setattr(transverse_metric_module, '_MOST_STEPS', 2000)
+    with pytest.raises(DataError, match='within 2,000 steps'):
         find_orbit(lambda x: -x, np.array([1.0, 0.0]), 0.1, 0.01)
