@@ -70,7 +70,7 @@ def stopped(cases: list[Case], rng: np.random.Generator) -> tuple[np.ndarray, np
         inside = batch.inside(x)
         kept[left[entered[left] & ~inside]] = False
         entered[left[inside]] = True
-        if tick % 250 == 0:
+        if tick % 50 == 0:
             moving = ~(inside & (batch.speed(x) < 1e-3 * batch.settings[0].system.radius[0]))
             at_rest[left[~moving]] = True
             if not np.any(moving):

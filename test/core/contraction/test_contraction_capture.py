@@ -90,7 +90,7 @@ def test_no_certified_inhibition_fails_to_stop() -> None:
         inside = batch.inside(x)
         assert not np.any(entered & ~inside), 'a captured oscillator left C'
         entered |= inside
-        if tick % 250 == 0:                                  # what is at rest stays there
+        if tick % 50 == 0:                                   # what is at rest stays there
             moving = ~(inside & (batch.speed(x) < 1e-3))
             settled += np.count_nonzero(~moving)
             batch.use(batch.rows[moving])
