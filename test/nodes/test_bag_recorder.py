@@ -13,7 +13,7 @@ import ros_processes
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from rclpy.qos import QoSProfile
@@ -299,6 +299,7 @@ def test_messages_without_a_stamp_bear_the_time_of_the_robot(tmp_path: Path) -> 
     assert [time_ns // TICK_NS for time_ns, _ in recorded['/inhibition_state']] == [10]
 
 
+@settings(max_examples=30)
 @given(st.permutations([(name, k) for name in ('joint_states', 'canonical_state')
                         for k in range(3, 9)]))
 def test_record_times_of_the_suite_do_not_depend_on_arrival(order: list[tuple[str, int]]) -> None:
@@ -315,6 +316,7 @@ def test_record_times_of_the_suite_do_not_depend_on_arrival(order: list[tuple[st
                       ) == [(k + 1) * TICK_NS for k in range(first, 9)]
 
 
+@settings(max_examples=30)
 @given(st.permutations(5 * ['joint_states', 'foot_contacts', 'canonical_state']))
 def test_topics_that_come_apart_by_seconds_keep_their_times(order: list[str]) -> None:
     stamps = [seconds * 10**9 for seconds in (1, 2, 4, 7, 8)]

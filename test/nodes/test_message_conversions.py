@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Twist, TwistStamped
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from messages import canonical_writer
@@ -89,6 +89,7 @@ def test_stamps_that_are_no_time_are_refused(stamp: Time) -> None:
         stamp_ns(stamp)
 
 
+@settings(max_examples=30)
 @given(STAMPS, numbers(4, 2), numbers(4, 2))
 def test_canonical_state(time_ns: int, x: np.ndarray, x_dot: np.ndarray) -> None:
     known = KnownGaits(GAITS)
@@ -127,6 +128,7 @@ def test_joint_targets(leg: str, values: np.ndarray) -> None:
     assert bits(*dataclasses.astuple(targets)) == bits(*dataclasses.astuple(sent))
 
 
+@settings(max_examples=30)
 @given(numbers(12), numbers(4, 3), numbers(4, 2), numbers(3), numbers(12), numbers(4), numbers(4),
        numbers(4), st.tuples(*[st.booleans()] * 4), numbers(4))
 def test_posture_feedback(torque: np.ndarray, shift: np.ndarray, drift: np.ndarray,
