@@ -16,7 +16,7 @@ import pytest
 from dmp_cpg_ros.studies import fuzz_samples
 from dmp_cpg_ros.studies.fuzz_files import Outcome, fuzz, main, table
 
-FILES_PER_KIND = 25
+FILES_PER_KIND = 15
 
 
 def test_spoiled_files_are_taken_or_refused_in_one_line(
