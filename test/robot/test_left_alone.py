@@ -77,7 +77,7 @@ class Walk:
 @pytest.mark.parametrize(('gait', 'speed'), [
     ('amble', 0.3), ('amble', 0.5), ('amble', 0.8), ('trot', 0.5), ('trot', 1.0), ('trot', 1.5)])
 def test_silent_in_any_phase_it_comes_to_a_stand(gait: str, speed: float) -> None:
-    walk = Walk(gait, speed).go(1000)
+    walk = Walk(gait, speed).go(750)
     tilts: list[float] = []
     while len(tilts) < PHASES:
         wanted, before = tau * len(tilts) / PHASES, walk.phase
