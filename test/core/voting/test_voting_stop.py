@@ -59,7 +59,7 @@ def test_a_minority_does_not_stop_the_gait(
         gait: str, canonical: CanonicalParameters, legs: tuple[str, ...]) -> None:
     run = walking(gait, **voters(inhibited_legs=LEGS[:3]), canonical=canonical)
     run.ticks.clear()
-    vote(run, legs, 3.0)
+    vote(run, legs, 2.0)
     assert not run.loop.stop.requested and set(run.words()) <= {'walking', 'free'}
     rates = [np.abs(tick.x_dot).max() for tick in run.ticks[-250:]]
     assert min(rates) > 1.0
@@ -94,7 +94,7 @@ def test_a_certified_majority_whose_legs_relieve_each_other_stops_and_fewer_do_n
     for missing in LEGS:
         run = walking('amble', **voters(inhibited_legs=LEGS[:3]), canonical=canonical)
         majority = tuple(leg for leg in LEGS if leg != missing)
-        vote(run, majority[1:], 2.0)
+        vote(run, majority[1:], 1.5)
         assert not run.loop.stop.requested
         vote(run, majority, 3.5, until='at_rest')
         bound = vote_bound(Setting.of(run.loop.network, p, TICK), run.loop.inhibition.gains)
