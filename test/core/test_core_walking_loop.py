@@ -50,7 +50,7 @@ def test_it_stands(robot: MujocoRobot) -> None:
 def test_it_walks_at_the_commanded_speed_and_straight(robot: MujocoRobot, gait: str) -> None:
     loop = WalkingLoop(robot.description, GAITS[gait], suite_parameters())
     loop.command(0.5)
-    states = walk(robot, loop, 5.0, robot.reset())[-500:]
+    states = walk(robot, loop, 4.0, robot.reset())[-500:]
     moved = states[-1].base_position_in_world - states[0].base_position_in_world
     assert moved[0] / (499 * TICK) == pytest.approx(0.5, rel=0.1)
     assert abs(moved[1]) < 0.1
@@ -64,7 +64,7 @@ def test_any_one_of_the_four_oscillators_stops_it(robot: MujocoRobot, leg: str) 
     loop.command(0.5)
     states = walk(robot, loop, 2.5, robot.reset())
     predicted = loop.request(True)
-    states = walk(robot, loop, 3.0, states[-1])
+    states = walk(robot, loop, 2.2, states[-1])
     assert loop.stop.state == 'at_rest'
     assert loop.stop.measured_s == pytest.approx(predicted, abs=1e-9)
     assert stands(states[-100:], robot.description.mass * GRAVITY)

@@ -44,7 +44,7 @@ def speeds_of(walk):
     reached = []
     for speed in SPEEDS:
         walk.loop.command(speed)
-        walk.go(1.5)
+        walk.go(1.0)
         reached.append(walk.go(1.1))
     return reached
 
