@@ -103,10 +103,14 @@ TAKEN_FOR_MORE = ('capture_anywhere', 'step_capture', 'late_inhibition', 'held_c
 
 @pytest.mark.parametrize('row', adversary_rows.ROWS)
 def test_no_row_that_holds_is_refuted(row: str) -> None:
-    rng = np.random.default_rng(2)
-    results = [adversary_rows.attack(rng, ROBOT, row, False) for _ in range(5)]
-    assert sum(ran for ran, _ in results) > 0
-    assert [failure for _, failures in results for failure in failures] == []
+    rng, tried = np.random.default_rng(2), 0
+    for _ in range(5):
+        ran, failures = adversary_rows.attack(rng, ROBOT, row, False)
+        assert failures == []
+        tried += ran
+        if tried >= 3:  # some draws do not apply
+            break
+    assert tried > 0
 
 
 def test_a_refuted_row_is_told_with_round_numbers() -> None:
