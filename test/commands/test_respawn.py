@@ -32,7 +32,7 @@ from dmp_cpg_ros.suite_table import PROCESSES, ROBOT
 processes, ros, ros_domain = (
     ros_processes.processes, ros_processes.ros, ros_processes.ros_domain)
 
-HUNG_S = 3.0
+HUNG_S = 1.5
 """How long ``walk`` waits for a node that hangs [s], instead of the usual 10 and 15."""
 
 AGAIN = 'all nodes are ready again'

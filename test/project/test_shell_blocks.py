@@ -9,9 +9,11 @@ import os
 import shlex
 import shutil
 import sys
+import time
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
+from signal import SIGINT
 
 import numpy as np
 import pytest
@@ -33,6 +35,9 @@ pytestmark = pytest.mark.skipif(
 
 PATIENCE_S = 600.0
 """How long a loaded machine may take [s]."""
+
+AGAIN_S = 0.7
+"""Time from one Ctrl-C to the next [s]."""
 
 SHORT = ('--no-report',)
 """Option with which walks are typed, for they are ended as soon as they walk: that a walk leaves a
@@ -128,10 +133,17 @@ class Reader:
         return process
 
     def finish(self) -> None:
-        """Press Ctrl-C in all terminals: clients end, suites lie down."""
-        for processes, statuses in ((self.beside, (0, 1, 130)), (self.suites, (130,))):
+        """Press Ctrl-C in all terminals: clients end, suites begin to lie down, which a second
+        Ctrl-C cuts short.
+        """
+        for processes, statuses in ((self.beside, (0, 1, 130)), (self.suites, (130, -SIGINT))):
             for process in processes:
                 process.interrupt()
+            lying = [suite for suite in self.suites if '--lock-step' not in suite.command[-1]]
+            if processes is self.suites and lying:
+                time.sleep(AGAIN_S)
+                for process in lying:
+                    process.interrupt()
             for process in processes:
                 assert process.wait(PATIENCE_S) in statuses, process
             processes.clear()
