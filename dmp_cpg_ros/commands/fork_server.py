@@ -132,7 +132,7 @@ class ForkServer:
                 pass_fds=(theirs.fileno(),), env={**OWN, **os.environ})
 
     def start(self, command: Sequence[str], output: int = 1, errors: int = 2, *,
-              environment: Mapping[str, str] | None = None) -> Forked:
+              environment: Mapping[str, str] | None = None, folder: str = '') -> Forked:
         """Run ``python -m dmp_cpg_ros command`` in a session of its own, so that Ctrl-C reaches
         this process only; it ends with this process.
 
@@ -144,6 +144,8 @@ class ForkServer:
             Descriptors of files to which it writes.
         environment : mapping of str to str, optional
             Its environment; default: that of this process.
+        folder : str
+            Its working folder; default: that of the server.
 
         Raises
         ------
@@ -151,7 +153,7 @@ class ForkServer:
             If it cannot, because the server has ended perhaps or does not answer.
         """
         wanted = os.environ if environment is None else environment
-        request = json.dumps([list(command), {**OWN, **wanted}]).encode()
+        request = json.dumps([list(command), {**OWN, **wanted}, folder]).encode()
         try:
             socket.send_fds(self._socket, [request], [output, errors])
             answer = self._socket.recv(64)
@@ -192,7 +194,7 @@ def _serve(parent: int, requests: socket.socket) -> None:
         message, files, _, _ = socket.recv_fds(requests, MOST_BYTES, 2)
         if not message:
             os._exit(0)
-        command, environment = json.loads(message)
+        command, environment, folder = json.loads(message)
         _read_ahead(command)
         adopted, go = os.pipe()
         said, say = os.pipe()
@@ -203,6 +205,7 @@ def _serve(parent: int, requests: socket.socket) -> None:
                 os._exit(0)
             os.read(adopted, 1)  # which ends when the server, the last that could write, says so
             _become(parent, files, command, environment)
+            os.chdir(folder or '.')
             os.write(say, str(os.getpid()).encode())
             for descriptor in (adopted, said, say, requests.detach()):
                 os.close(descriptor)

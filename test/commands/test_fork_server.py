@@ -72,6 +72,12 @@ def test_it_does_what_its_command_does_alone(server: ForkServer, tmp_path: Path)
                            env=narrow, capture_output=True, check=True)
     assert process.wait(WAIT_S) == 0
     assert (tmp_path / 'output').read_bytes() == alone.stdout != b''
+    (tmp_path / 'bad.yaml').write_text('name: bad', encoding='utf-8')
+    with (tmp_path / 'there').open('wb') as there:
+        elsewhere = server.start(['walk', 'bad.yaml'], 1, there.fileno(), folder=str(tmp_path))
+    assert elsewhere.wait(WAIT_S) == 2
+    assert b'bad.yaml' in (tmp_path / 'there').read_bytes()
+    assert b'needs duration' in (tmp_path / 'there').read_bytes()
     with (tmp_path / 'errors').open('wb') as errors:
         refused = server.start(['certify', '--no-such-option'], 1, errors.fileno())
     assert refused.wait(WAIT_S) == 2

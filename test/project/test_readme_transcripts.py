@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from checkout import setup_constant
 from ros_processes import SHARED_HZ, NodeProcess, Processes, Ros, reserved_domain
 from test_readme import TRANSCRIPTS, as_shown, files, transcript
 
@@ -23,6 +25,7 @@ from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
 from dmp_cpg_ros.nodes.messages.values import stamp_ns
 
 BIN = Path(sys.prefix) / 'bin'
+EXECUTABLES = setup_constant('EXECUTABLES')
 pytestmark = pytest.mark.skipif(
     not (BIN / 'robot_client').exists(), reason='the commands are not installed')
 
@@ -71,7 +74,10 @@ class Reader:
         """Run a command; returns what it prints, of one in the background nothing."""
         text = re.sub(r'^walk\b', f'walk{self.options}', command.partition('#')[0].strip())
         begun = self.changes
-        process = self.processes.start(
+        name, *words = shlex.split(text.rstrip(' &'))
+        forked = name in EXECUTABLES and '|' not in words and self.options  # not of the README
+        process = self.processes.executable(
+            name, *words, folder=str(self.folder)) if forked else self.processes.start(
             'bash', '-c', f'cd {self.folder}; PATH={BIN}:$PATH; exec {text.rstrip(" &")}')
         if text.endswith('&'):
             self.background.append(process)

@@ -20,7 +20,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from checkout import ROOT, needs_make, recipe
+from checkout import ROOT, needs_make, recipe, setup_constant
 from demonstrations import straight_reach
 from ros_processes import SHARED_HZ, NodeProcess, Processes, reserved_domain
 from test_readme import DOCUMENTS, TRANSCRIPTS, blocks, commands, transcript
@@ -30,6 +30,7 @@ from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 
 BIN = Path(sys.prefix) / 'bin'
+EXECUTABLES = setup_constant('EXECUTABLES')
 pytestmark = pytest.mark.skipif(
     not (BIN / 'walk').exists(), reason='the commands are not installed')
 
@@ -123,6 +124,10 @@ class Reader:
         self.beside: list[NodeProcess] = []
 
     def start(self, command: str) -> NodeProcess:
+        """Start a command: in a shell as those of the README, or forked where it is one."""
+        name, *words = shlex.split(command)
+        if name in EXECUTABLES and not self.usual_rate:
+            return self.processes.executable(name, *words, folder=str(self.folder))
         return self.processes.start(
             'bash', '-c', f'cd {self.folder}; PATH={BIN}:$PATH; exec {command}')
 
@@ -139,7 +144,7 @@ class Reader:
         for processes, statuses in ((self.beside, (0, 1, 130)), (self.suites, (130, -SIGINT))):
             for process in processes:
                 process.interrupt()
-            lying = [suite for suite in self.suites if '--lock-step' not in suite.command[-1]]
+            lying = [suite for suite in self.suites if '--lock-step' not in str(suite.command)]
             if processes is self.suites and lying:
                 time.sleep(AGAIN_S)
                 for process in lying:

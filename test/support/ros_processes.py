@@ -75,15 +75,17 @@ class NodeProcess:
         Its environment.
     forked : bool
         Whether it is an executable of the package that the fork server starts.
+    folder : str
+        Where the fork server starts it.
     """
 
     def __init__(self, command: Sequence[str], environment: Mapping[str, str], *,
-                 forked: bool) -> None:
+                 forked: bool, folder: str = '') -> None:
         self.command = list(command)
         read, write = os.pipe()
         if forked:
             self._process: subprocess.Popen[bytes] | Forked = fork_server().start(
-                command, write, write, environment=environment)
+                command, write, write, environment=environment, folder=folder)
         else:
             self._process = subprocess.Popen(command, env=environment, stdout=write,
                                              stderr=write, cwd=TESTS, start_new_session=True)
@@ -192,9 +194,11 @@ class Processes:
                 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'PYTHONPATH': os.pathsep.join(paths),
                 MARK: self._mark}
 
-    def start(self, *command: str, forked: bool = False, **environment: str) -> NodeProcess:
-        """Start any command."""
-        process = NodeProcess(command, {**self.environment, **environment}, forked=forked)
+    def start(self, *command: str, forked: bool = False, folder: str = '',
+              **environment: str) -> NodeProcess:
+        """Start any command; an executable of the package in some folder."""
+        process = NodeProcess(command, {**self.environment, **environment}, forked=forked,
+                              folder=folder)
         self._started.append(process)
         return process
 
@@ -215,9 +219,9 @@ class Processes:
         """Start this Python with arguments."""
         return self.start(sys.executable, *arguments, **environment)
 
-    def executable(self, *command: str) -> NodeProcess:
+    def executable(self, *command: str, folder: str = '') -> NodeProcess:
         """Start an executable of the package as the fork server does it."""
-        return self.start(*command, forked=True)
+        return self.start(*command, forked=True, folder=folder)
 
     def node(self, kind: str, *ros_arguments: str, **parameters: Any) -> NodeProcess:
         """Start a node of the suite, with parameters as keywords."""
