@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The robot climbs stairs of 10 cm blind, and forgets them on even ground."""
+"""The robot climbs stairs of 10 cm and strides over gaps blind, and forgets them after a way."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import pytest
 
 from dmp_cpg_ros.core.balance.terrain import NOTHING_FELT, Terrain
 from dmp_cpg_ros.core.robot_model.grounds import Steps
+from dmp_cpg_ros.core.robot_model.rough_grounds import Gaps
 from dmp_cpg_ros.studies.walking_trials import Walk, attitude
 
 HIGHEST_STEP = 0.1
-ON_TOP, DOWN = 1.6, 3.2
+ON_TOP, DOWN, BEYOND = 1.6, 3.2, 3.0
 
 
 def test_trot_climbs_two_stairs_and_forgets_them() -> None:
@@ -39,6 +40,20 @@ def test_trot_comes_down_stairs_without_diving() -> None:
         steepest = max(steepest, float(np.abs(attitude(run.states[-1:])[:, 1]).max()))
     assert run.state.base_position_in_world[0] >= DOWN
     assert steepest < np.deg2rad(20.0)
+
+
+def test_amble_strides_over_gaps() -> None:
+    """A body that braked because of the leg in the gap fell over it."""
+    run = Walk('amble', world=Gaps(width=0.1, count=3, depth=0.5), seed=201)
+    run.loop.command(0.5 * float(np.random.default_rng(200).uniform(0.9, 1.1)))
+    shares, gaps = [], []
+    while run.state.base_position_in_world[0] < BEYOND and run.state.time_ns < 10e9:
+        assert run.walk(0.1)
+        gaps.append(run.loop.posture.balance.terrain.gaps)
+        shares.append(run.loop.stop.share)
+    assert run.state.base_position_in_world[0] >= BEYOND
+    assert max(gaps) > 0.0
+    assert all(share > 0.5 for share, gap in zip(shares[5:], gaps, strict=False) if gap)
 
 
 def test_without_climbing_nothing_is_remembered() -> None:

@@ -130,14 +130,14 @@ def test_joint_targets(leg: str, values: np.ndarray) -> None:
 
 @settings(max_examples=30)
 @given(numbers(12), numbers(4, 3), numbers(4, 2), numbers(3), numbers(12), numbers(4), numbers(4),
-       numbers(4), st.tuples(*[st.booleans()] * 4), numbers(4))
+       numbers(5), st.tuples(*[st.booleans()] * 4), numbers(4))
 def test_posture_feedback(torque: np.ndarray, shift: np.ndarray, drift: np.ndarray,
                           correction: np.ndarray, measured: np.ndarray,
                           force: np.ndarray, margins: np.ndarray, way: np.ndarray,
                           felt: tuple[bool, ...], level: np.ndarray) -> None:
     command = BodyCommand('rising', 'rise', 1.0 / 3.0, -0.1)
     sent = PostureFeedback(torque, shift, drift, correction, command, measured, force,
-                           tuple(margins.tolist()), Progress((way[0], way[1]), way[2], way[3]),
+                           tuple(margins.tolist()), Progress((way[0], way[1]), *way[2:].tolist()),
                            felt, tuple(level.tolist()))
     message = wire(PostureFeedbackWriter().fill(0, sent))
     read = PostureFeedbackReader().read(message)

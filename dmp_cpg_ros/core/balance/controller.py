@@ -262,7 +262,7 @@ class PostureController:
                 measured[1] - (planned[1] - lasting[1]))),
             Progress((measured[0], measured[1]), feet_behind(
                 plan.expected, beside, feet, self._footholds, positions, duty, omega),
-                terrain.rough), felt or FELT, level)
+                terrain.rough, terrain.gaps), felt or FELT, level)
 
     def _ground(self, terrain: Terrain, state: RobotState, normal_in_base: Triple,
                 feet_in_base: Sequence[Triple], swung: Sequence[float], gait: GaitInForce,

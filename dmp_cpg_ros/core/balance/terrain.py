@@ -31,6 +31,11 @@ count on it, overturns the robot. From there on ρ grows to
 
 up to ``HIGHEST`` l, and fades by e^(−s/(``FADES`` l)) on a way s. On flat ground no foothold is
 that high, ρ is 0 and so are all e_i.
+
+**Gaps.** A foot that is to stand, touches nothing, and is lower than the median of all footholds
+by more than ``HOLLOW`` l is in a gap. For the next ``FADES`` l the body does not follow less of
+its command because of it: it would fall over the leg that does not bear, and slow feet step into
+every gap. Only a body that may tell the first step finds a first gap.
 """
 
 from __future__ import annotations
@@ -56,6 +61,9 @@ ROLLING = 0.17
 
 SLOW = 0.5
 """Share of a gait's highest speed below which it may, of the reference and of the body."""
+
+HOLLOW = 0.05
+"""How deep a foot without ground hangs in a gap, in lengths of the leg."""
 
 SCUFFING = (0.25, 0.8)
 """Shares of the swing between which a foot that touches something has met an obstacle."""
@@ -102,6 +110,8 @@ class Terrain(NamedTuple):
     ----------
     rough : float
         ρ [m]; 0 on even ground.
+    gaps : float
+        For how much more way gaps are counted on [m].
     footholds : tuple of (float, float, float)
         p_i, where each foot stood last [m]; empty before the first tick.
     place : tuple of float
@@ -109,6 +119,7 @@ class Terrain(NamedTuple):
     """
 
     rough: float = 0.0
+    gaps: float = 0.0
     footholds: tuple[Triple, ...] = ()
     place: Triple = (0.0, 0.0, 0.0)
 
@@ -164,8 +175,15 @@ class Terrain(NamedTuple):
                 height = dot(normal, foot) - mean
                 if height > CLEAR_OF_GROUND * leg_length:
                     rough = max(rough, height + MARGIN * leg_length)
+        middle = 0.5 * (lower + higher)
+        hangs = (calm or self.gaps) and any(
+            not (touch or 0.0 <= share <= 1.0)
+            and middle - dot(normal, foot) > HOLLOW * leg_length
+            for foot, share, touch in zip(feet, swung, touches, strict=True))
+        left = 0.0 if anew else max(0.0, self.gaps - way)
+        gaps = FADES * leg_length if hangs and not anew else left
         rough = min(rough, HIGHEST * leg_length) if rough > FORGOTTEN * leg_length else 0.0
-        return Terrain(rough, footholds, place), LEVEL_FEET if rough == 0.0 else tuple(
+        return Terrain(rough, gaps, footholds, place), LEVEL_FEET if rough == 0.0 else tuple(
             height - mean - RAISED * rough - (
                 SEARCHED * leg_length if share > 1.0 and not touch else 0.0)
             for height, share, touch in zip(heights, swung, touches, strict=True))

@@ -78,11 +78,14 @@ class Progress(NamedTuple):
         where they are ahead of it, 0 where none of them stands.
     rough : float
         Height of what its feet are to be lifted over [m]; 0 on even ground.
+    gaps : float
+        For what way gaps are counted on [m]; 0 where the ground has none.
     """
 
     velocity: Pair = (0.0, 0.0)
     behind: float = 0.0
     rough: float = 0.0
+    gaps: float = 0.0
 
 
 class BlockState(NamedTuple):

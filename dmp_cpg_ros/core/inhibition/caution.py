@@ -40,6 +40,11 @@ CLIMBING = 0.8
 them, the margins are small by that, and a body that does not go on falls back from them.
 """
 
+STRIDING = 1.0
+"""Least share where gaps are counted on: a body that brakes falls over the leg that hangs in one,
+and slow feet step into every gap.
+"""
+
 NARROW = 0.5
 """q of a gait that stands on one side only."""
 

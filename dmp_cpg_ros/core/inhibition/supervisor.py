@@ -33,6 +33,7 @@ from dmp_cpg_ros.core.inhibition.blocked import NO_BLOCK, Progress, block_step
 from dmp_cpg_ros.core.inhibition.caution import (
     CLIMBING,
     LEAST,
+    STRIDING,
     changing_share,
     followed_share,
     room,
@@ -174,28 +175,29 @@ class GaitSupervisor:
         state = self._blocked(state, r, command, progress, network, body_mode, dt)
         state = self._voted(state, tally or state.tally, network)
         state = self._pushed(state, network, x, margins, body_mode)
-        rough = progress is not None and progress.rough > 0.0
         most = 1.0 if wanted is None else changing_share(network, wanted, command)
         quick = state.quickness > 1.0
-        state = self._balancing(state, margins, network, rough, most, dt)
+        state = self._balancing(state, margins, network, progress or Progress(), most, dt)
         if state.requested:
             return (replace_unchecked(state, armed=False, state='waiting') if quick
                     else self._stopping(state, network, x, rates, speed))
         return self._running(state, network.phase_errors(x), speed)
 
     def _balancing(self, state: SupervisorState, margins: Sequence[float] | None,
-                   network: GaitNetwork, rough: bool, most: float, dt: float) -> SupervisorState:
+                   network: GaitNetwork, progress: Progress, most: float, dt: float
+                   ) -> SupervisorState:
         """Follow less of the command, and step faster, while the body is disturbed; follow at most
         a share of it while the gait changes. On rough ground feet need their time to be lifted
         over it.
         """
+        least = STRIDING if progress.gaps else CLIMBING if progress.rough else LEAST
         p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.wide)
         predicted = state.requested or state.state == 'releasing'
         share, most = 1.0, min(most, state.block.most)
         if not (predicted or state.push.acts):
             share = followed_share(state.share, left if p.caution else None, dt, most,
-                                   CLIMBING if rough else LEAST)
-        free = p.step_timing and (state.push.acts or not predicted) and not rough
+                                   least)
+        free = p.step_timing and (state.push.acts or not predicted) and not progress.rough
         quickness = quickened(state.quickness, left if free else None, dt)
         same = (share, quickness) == (state.share, state.quickness)
         return state if same else replace_unchecked(state, share=share, quickness=quickness)

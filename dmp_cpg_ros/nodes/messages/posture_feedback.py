@@ -44,8 +44,8 @@ class PostureFeedbackWriter:
         self._velocity[_FEET].reshape(len(LEGS), 3)[:, :2] = feedback.drift_in_base
         self._velocity[_BASE] = feedback.correction
         self._position[_MARGINS] = feedback.margins
-        velocity, behind, rough = feedback.progress or Progress()
-        self._position[_PROGRESS] = (*velocity, behind, rough)
+        velocity, *rest = feedback.progress or Progress()
+        self._position[_PROGRESS] = (*velocity, *rest)
         self._position[_FELT] = feedback.felt
         self._position[_GROUND] = feedback.level
         self._effort[_JOINTS] = feedback.torque
@@ -75,8 +75,8 @@ class PostureFeedbackReader:
 
 
 def _progress(row: Array) -> Progress:
-    x, y, behind, rough = row.tolist()
-    return Progress((x, y), behind, rough)
+    x, y, *rest = row.tolist()
+    return Progress((x, y), *rest)
 
 
 class CommandReader:

@@ -16,6 +16,7 @@ from dmp_cpg_ros.core.balance.terrain import (
     FOLLOWED,
     FORGOTTEN,
     HIGHEST,
+    HOLLOW,
     JUMP,
     LEVEL_FEET,
     MARGIN,
@@ -29,7 +30,7 @@ from dmp_cpg_ros.core.maths.vec3 import Triple
 
 LENGTH = 0.28
 NOTHING = Terrain()
-KNOWN = Terrain(0.02, ((0.0, 0.0, 0.0),) * 4, (0.0, 0.0, 0.3))
+KNOWN = Terrain(0.02, 0.0, ((0.0, 0.0, 0.0),) * 4, (0.0, 0.0, 0.3))
 UP = (0.0, 0.0, 1.0)
 STANDING, SWINGING = -0.2, 0.5
 PLACES = ((0.2, 0.1), (0.2, -0.1), (-0.2, 0.1), (-0.2, -0.1))
@@ -38,11 +39,11 @@ heights = st.lists(st.floats(-0.5, 0.5), min_size=4, max_size=4)
 
 
 def felt(z: Sequence[float], terrain: Terrain = NOTHING, x: float = 0.0,
-         swung: Sequence[float] = (STANDING,) * 4, touches: Sequence[bool] = (True,) * 4
-         ) -> tuple[Terrain, tuple[float, ...]]:
+         swung: Sequence[float] = (STANDING,) * 4, touches: Sequence[bool] = (True,) * 4,
+         calm: bool = True) -> tuple[Terrain, tuple[float, ...]]:
     feet: list[Triple] = [
         (x + a, b, up) for (a, b), up in zip(PLACES, z, strict=True)]
-    return terrain.felt((x, 0.0, 0.3), feet, UP, swung, touches, LENGTH)
+    return terrain.felt((x, 0.0, 0.3), feet, UP, swung, touches, LENGTH, calm)
 
 
 @given(heights)
@@ -135,3 +136,27 @@ def test_estimate_that_begins_anew_forgets() -> None:
 def test_body_leans_less_than_the_footholds_where_it_is_rough() -> None:
     assert NOTHING.followed == 1.0
     assert KNOWN.followed == FOLLOWED < 1.0
+
+
+@pytest.mark.parametrize(('deep', 'touches', 'swung', 'finds'), [
+    (1.2, False, 1.5, True), (1.2, False, STANDING, True), (1.2, True, 1.5, False),
+    (1.2, False, SWINGING, False), (0.8, False, 1.5, False)])
+def test_foot_without_ground_finds_a_gap(
+        deep: float, touches: bool, swung: float, finds: bool) -> None:
+    stood, _ = felt((0.0,) * 4)
+    low = (-deep * HOLLOW * LENGTH, 0.0, 0.0, 0.0)
+    arguments = {'swung': (swung, *[STANDING] * 3), 'touches': (touches, True, True, True)}
+    found, level = felt(low, stood, **arguments)
+    assert (found.gaps > 0.0) == finds and not found.rough and level is LEVEL_FEET
+    wild, _ = felt(low, stood, calm=False, **arguments)
+    assert wild.gaps == 0.0
+
+
+def test_gaps_are_counted_on_for_a_way() -> None:
+    before = NOTHING._replace(footholds=KNOWN.footholds, place=KNOWN.place, gaps=FADES * LENGTH)
+    on, _ = felt((0.0,) * 4, before, x=0.1)
+    assert on.gaps == pytest.approx(FADES * LENGTH - 0.1)
+    past, _ = felt((0.0,) * 4, on._replace(gaps=0.05), x=0.2)
+    assert past.gaps == 0.0
+    anew, _ = felt((0.0,) * 4, on, x=0.1 + 2.0 * JUMP * LENGTH)
+    assert anew.gaps == 0.0
