@@ -281,7 +281,7 @@ class PostureController:
             place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot in feet_in_base],
             n, swung,
             [force > self._touch_force for force in believed(state.foot_force).tolist()],
-            self.scale.leg_length, calm)
+            self.scale.leg_length, calm, all(end.steps == len(LEGS) for end in gait.ends))
 
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], swings: list[float],
                  under: Pair, error: Pair) -> tuple[float, ...]:

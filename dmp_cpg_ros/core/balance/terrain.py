@@ -35,7 +35,8 @@ that high, ρ is 0 and so are all e_i.
 **Gaps.** A foot that is to stand, touches nothing, and is lower than the median of all footholds
 by more than ``HOLLOW`` l is in a gap. For the next ``FADES`` l the body does not follow less of
 its command because of it: it would fall over the leg that does not bear, and slow feet step into
-every gap. Only a body that may tell the first step finds a first gap.
+every gap. Only a body that may tell the first step finds a first gap, and only in a gait whose
+legs step one after the other: two legs of a trot bear too short for that.
 """
 
 from __future__ import annotations
@@ -130,7 +131,7 @@ class Terrain(NamedTuple):
 
     def felt(self, place: Triple, feet: Sequence[Triple], normal: Triple,
              swung: Sequence[float], touches: Sequence[bool], leg_length: float,
-             calm: bool = True) -> tuple[Terrain, tuple[float, ...]]:
+             calm: bool = True, in_turn: bool = True) -> tuple[Terrain, tuple[float, ...]]:
         """Advance by one tick.
 
         Parameters
@@ -150,6 +151,8 @@ class Terrain(NamedTuple):
             l [m].
         calm : bool
             Whether the body may tell the first step.
+        in_turn : bool
+            Whether the legs step one after the other.
 
         Returns
         -------
@@ -176,7 +179,7 @@ class Terrain(NamedTuple):
                 if height > CLEAR_OF_GROUND * leg_length:
                     rough = max(rough, height + MARGIN * leg_length)
         middle = 0.5 * (lower + higher)
-        hangs = (calm or self.gaps) and any(
+        hangs = in_turn and (calm or self.gaps) and any(
             not (touch or 0.0 <= share <= 1.0)
             and middle - dot(normal, foot) > HOLLOW * leg_length
             for foot, share, touch in zip(feet, swung, touches, strict=True))

@@ -190,7 +190,7 @@ class GaitSupervisor:
         a share of it while the gait changes. On rough ground feet need their time to be lifted
         over it.
         """
-        least = STRIDING if progress.gaps else CLIMBING if progress.rough else LEAST
+        least = CLIMBING if progress.rough else STRIDING if progress.gaps else LEAST
         p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.wide)
         predicted = state.requested or state.state == 'releasing'
         share, most = 1.0, min(most, state.block.most)

@@ -40,10 +40,10 @@ heights = st.lists(st.floats(-0.5, 0.5), min_size=4, max_size=4)
 
 def felt(z: Sequence[float], terrain: Terrain = NOTHING, x: float = 0.0,
          swung: Sequence[float] = (STANDING,) * 4, touches: Sequence[bool] = (True,) * 4,
-         calm: bool = True) -> tuple[Terrain, tuple[float, ...]]:
+         calm: bool = True, in_turn: bool = True) -> tuple[Terrain, tuple[float, ...]]:
     feet: list[Triple] = [
         (x + a, b, up) for (a, b), up in zip(PLACES, z, strict=True)]
-    return terrain.felt((x, 0.0, 0.3), feet, UP, swung, touches, LENGTH, calm)
+    return terrain.felt((x, 0.0, 0.3), feet, UP, swung, touches, LENGTH, calm, in_turn)
 
 
 @given(heights)
@@ -148,8 +148,9 @@ def test_foot_without_ground_finds_a_gap(
     arguments = {'swung': (swung, *[STANDING] * 3), 'touches': (touches, True, True, True)}
     found, level = felt(low, stood, **arguments)
     assert (found.gaps > 0.0) == finds and not found.rough and level is LEVEL_FEET
-    wild, _ = felt(low, stood, calm=False, **arguments)
-    assert wild.gaps == 0.0
+    for which in ('calm', 'in_turn'):
+        never, _ = felt(low, stood, **{which: False}, **arguments)
+        assert never.gaps == 0.0
 
 
 def test_gaps_are_counted_on_for_a_way() -> None:
