@@ -171,7 +171,8 @@ def foot_slip(recording: Recording, robot: RobotDescription, contact_force: floa
     """Distance that each foot's contact point slid horizontally while it carried load.
 
     The contact point is the lowest point of the foot's sphere: a foot that rolls without sliding
-    does not slip.
+    does not slip. Its way is averaged over ``SLIP_WINDOW``: the noise of the joints' sensors is no
+    slip.
 
     Parameters
     ----------
@@ -201,21 +202,31 @@ def foot_slip(recording: Recording, robot: RobotDescription, contact_force: floa
 ROWS_AT_ONCE = 100_000
 """Rows of a long recording that are worked on together."""
 
+SLIP_WINDOW = 0.04
+"""Time over which the way of a standing foot is averaged before it is measured [s]."""
+
 
 def _foot_slip(joints: JointSeries, odometry: OdometrySeries, feet: FootForceSeries,
                robot: RobotDescription, contact_force: float) -> Array:
-    dt = np.diff(joints.time)[:, None]
-    slips = []
+    time, slips = joints.time, []
     for i, leg in enumerate(robot.legs):
         q, q_dot = (of[:, 3 * i : 3 * i + 3] for of in (joints.position, joints.velocity))
         rate = rotated(odometry.quaternion,
                        odometry.rate_in_base + shank_rate_in_base(leg, q, q_dot))
         rolling = leg.foot_radius * np.stack([rate[:, 1], -rate[:, 0]], axis=1)  # ω × (radius ẑ)
-        rolled = 0.5 * (rolling[1:] + rolling[:-1]) * dt
-        steps = np.hypot(*(np.diff(feet_in_world(leg, q, odometry)[:, :2], axis=0) - rolled).T)
-        loaded = feet.force[:, i] > contact_force
-        slips.append(steps[loaded[1:] & loaded[:-1]].sum())
+        foot = feet_in_world(leg, q, odometry)[:, :2]
+        stances = (slice(*rows) for rows in stretches(feet.force[:, i] > contact_force))
+        slips.append(sum(_length(time[rows], foot[rows] - integral(time[rows], rolling[rows]))
+                         for rows in stances))
     return np.array(slips)
+
+
+def _length(time: Array, place: Array) -> float:
+    """Length of the way through places (n, 2) that are averaged, from one window to the next."""
+    place = smoothed(time, place, SLIP_WINDOW)
+    window = SLIP_WINDOW * np.arange(1, round((time[-1] - time[0]) / SLIP_WINDOW))
+    rows = [0, *np.searchsorted(time, time[0] + window), len(time) - 1]
+    return float(np.hypot(*np.diff(place[rows], axis=0).T).sum())
 
 
 def feet_in_world(leg: LegGeometry, q: Array, odometry: OdometrySeries) -> Array:

@@ -113,6 +113,18 @@ def test_slip_is_found(slip_speed: float) -> None:
     assert metrics_of(walk)['robot']['foot_slip_m'] == pytest.approx(expected, abs=1e-6)
 
 
+@pytest.mark.parametrize('slip_speed', [0.0, 0.02])
+def test_noise_of_the_joints_is_no_slip(slip_speed: float) -> None:
+    walk = SyntheticWalk(slip_speed=slip_speed, rate_hz=250.0, end_s=9.0)
+    exact = walk.recording().joints
+    noise = np.random.default_rng(1).normal(0.0, 1e-3, exact.position.shape)
+    noisy = dataclasses.replace(exact, position=exact.position + noise)
+    slip, noisy_slip = (metrics_of(walk, joints=joints)['robot']['foot_slip_m']
+                        for joints in (exact, noisy))
+    way_of_noise = 0.41 * np.sqrt(2.0) * 1e-3 * len(walk.time) * 4
+    assert noisy_slip - slip < 0.05 * way_of_noise
+
+
 def test_slip_does_not_depend_on_the_heading() -> None:
     straight = metrics_of(SyntheticWalk(slip_speed=0.02))['robot']
     turned = metrics_of(SyntheticWalk(slip_speed=0.02, turn_rate=0.4))['robot']
