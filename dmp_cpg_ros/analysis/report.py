@@ -7,6 +7,7 @@ and the run in plain sentences, each with its number and whether it holds.
 from __future__ import annotations
 
 import base64
+import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 from inspect import getdoc
@@ -23,6 +24,8 @@ from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.strict_json import to_json
 from dmp_cpg_ros.analysis.tables import as_text, flattened
 
+_log = logging.getLogger(__name__)
+
 CATALOGUE = (
     gait.target_kinematics, gait.canonical_states, gait.phase_portrait, gait.footfall,
     robot.path, robot.speed_tracking, robot.attitude, robot.estimation, robot.torques,
@@ -37,7 +40,8 @@ def caption(draw: Callable[..., object]) -> tuple[str, str]:
 
 
 def write_figures(recording: Recording, context: RunContext, folder: Path) -> dict[str, Path]:
-    """Draw and write ``NAME.png`` for each figure that the recording allows.
+    """Draw and write ``NAME.png`` for each figure that the recording allows; one that its values
+    do not let be drawn is warned of and left out.
 
     Returns
     -------
@@ -47,11 +51,15 @@ def write_figures(recording: Recording, context: RunContext, folder: Path) -> di
     folder.mkdir(parents=True, exist_ok=True)
     written = {}
     for draw in CATALOGUE:
-        with style.applied():
-            figure = draw(recording, context)
-            if figure is not None:
-                written[draw.__name__] = folder / f'{draw.__name__}.png'
-                FigureCanvasAgg(figure).print_png(written[draw.__name__])
+        file = folder / f'{draw.__name__}.png'
+        try:
+            with style.applied():
+                figure = draw(recording, context)
+                if figure is not None:
+                    FigureCanvasAgg(figure).print_png(file)
+                    written[draw.__name__] = file
+        except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
+            _log.warning("no figure '%s': %s", draw.__name__, error)
     return written
 
 

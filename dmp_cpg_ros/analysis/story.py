@@ -17,6 +17,9 @@ from dmp_cpg_ros.analysis.recording import Array, Recording
 MOST_POINTS = 6000
 """Points of a line; between them are the least and the largest value of what is left out."""
 
+FASTEST = 1e6
+"""What is more, or no number, is no speed and is not drawn [m/s]."""
+
 CAPTION = (
     'Forward speed as commanded, as filtered by the reference, and as walked (mean over a gait '
     'cycle). Shaded: a stop was requested, then inhibition held an oscillator. Below, from each '
@@ -30,10 +33,10 @@ LANE = 0.16
 def story(recording: Recording, metrics: Mapping[str, Any]) -> str:
     """Figure as HTML; empty where neither speeds nor stops were recorded."""
     lines = {
-        'commanded': _steps(recording.commands.time, recording.commands.value[:, 0],
+        'commanded': _steps(*_sane(recording.commands.time, recording.commands.value[:, 0]),
                             recording.span[1]),
-        'reference': (recording.reference.time, recording.reference.value[:, 0]),
-        'walked': _walked(recording)}
+        'reference': _sane(recording.reference.time, recording.reference.value[:, 0]),
+        'walked': _sane(*_walked(recording))}
     lines = {name: line for name, line in lines.items() if len(line[0]) > 1}
     stops = metrics['stop']['all']
     start, end = recording.span
@@ -67,6 +70,12 @@ def _walked(recording: Recording) -> tuple[Array, Array]:
     speed = motion.velocity_in_heading(odometry)[:, 0]
     return odometry.time, motion.smoothed(
         odometry.time, speed, episodes.gait_period(recording) or 0.5)
+
+
+def _sane(time: Array, value: Array) -> tuple[Array, Array]:
+    """Rows whose values are speeds."""
+    rows = np.abs(value) <= FASTEST
+    return time[rows], value[rows]
 
 
 def _steps(time: Array, value: Array, end: float) -> tuple[Array, Array]:

@@ -18,13 +18,20 @@ from browser import browser, find_browser
 from synthetic_bag import write_bag
 from synthetic_walk import SyntheticWalk, robot
 
+from dmp_cpg_ros.analysis import report
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import planned_stance
 from dmp_cpg_ros.analysis.facts import facts
+from dmp_cpg_ros.analysis.figures import robot as robot_figures
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
-from dmp_cpg_ros.analysis.recording import Recording, StatusEvent, VelocitySeries
+from dmp_cpg_ros.analysis.recording import (
+    ArrivalSeries,
+    Recording,
+    StatusEvent,
+    VelocitySeries,
+)
 from dmp_cpg_ros.analysis.report import CATALOGUE, FOLDED, SCRIPT, label, write_figures
 from dmp_cpg_ros.analysis.run import RunResults, moments, write_results
 from dmp_cpg_ros.analysis.story import MOST_POINTS, story
@@ -176,6 +183,47 @@ def test_a_long_story_has_few_points_and_keeps_its_extremes(context: RunContext)
     speeds = [float(point.partition(',')[2]) for point in points.split()]
     assert len(speeds) <= MOST_POINTS
     assert (max(speeds), min(speeds)) == (0.9, -0.7)
+
+
+@pytest.mark.parametrize('wrong', [np.nan, np.inf, -1e308])
+def test_the_story_leaves_out_what_is_no_speed(
+        walked: Recording, context: RunContext, wrong: float) -> None:
+    value = walked.commands.value.copy()
+    value[5, 0] = wrong
+    recording = dataclasses.replace(
+        walked, commands=dataclasses.replace(walked.commands, value=value))
+    html = story(recording, compute_metrics(recording, context))
+    assert 'polyline class="commanded"' in html and 'nan' not in html
+    (zero,) = shapes(html, 'zero')
+    assert re.findall(r'viewBox="[-\d. ]*"', html) == re.findall(
+        r'viewBox="[-\d. ]*"', story(walked, compute_metrics(walked, context))) and zero
+
+
+def test_what_is_no_pose_is_left_out_of_the_path(
+        walked: Recording, context: RunContext, tmp_path: Path) -> None:
+    position = walked.odometry.position_in_world.copy()
+    position[7, 1], position[9, 0] = np.nan, np.inf
+    recording = dataclasses.replace(
+        walked, odometry=dataclasses.replace(walked.odometry, position_in_world=position))
+    assert robot_figures.path(recording, context) is not None
+    assert len(write_figures(recording, context, tmp_path)) == len(CATALOGUE)
+
+
+def test_targets_that_came_before_their_states_have_a_histogram() -> None:
+    state = np.arange(9.0)
+    arrivals = ArrivalSeries(0.004 * state, state, state - 0.5)
+    assert robot_figures.timing(Recording(arrivals=arrivals), RunContext()) is not None
+
+
+def test_a_figure_that_cannot_be_drawn_costs_no_other(
+        walked: Recording, context: RunContext, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+        caplog: pytest.LogCaptureFixture) -> None:
+    def broken(recording: Recording, context: RunContext) -> None:
+        raise ValueError('no limits')
+
+    monkeypatch.setattr(report, 'CATALOGUE', (broken, robot_figures.attitude))
+    assert list(write_figures(walked, context, tmp_path)) == ['attitude']
+    assert "no figure 'broken': no limits" in caplog.text
 
 
 @pytest.mark.skipif(find_browser() is None, reason='no Chromium here')

@@ -207,7 +207,7 @@ def _histogram(axes: Axes, values: Array, label: str) -> None:
     if not values.size:
         axes.set_axis_off()
         return
-    largest = float(np.percentile(values, 99.9)) * 1.1 or 1.0
+    largest = max(1.1 * float(np.percentile(values, 99.9)), 0.0) or 1.0
     axes.hist(np.clip(values, 0.0, largest), bins=80, range=(0.0, largest), color=MEDIAN)
     axes.set(xlabel=label, ylabel='ticks', yscale='log',
              title=f'median {np.median(values):.2f} ms, 99% {np.percentile(values, 99):.2f} ms, '
@@ -221,6 +221,8 @@ def path(recording: Recording, context: RunContext) -> Figure | None:
     robot stood still, arrows its heading every two seconds.
     """
     odometry = recording.odometry
+    poses = np.column_stack([odometry.position_in_world[:, :2], odometry.quaternion])
+    odometry = taken(odometry, np.isfinite(poses).all(axis=1))
     time = odometry.time
     if time.size < 2:
         return None
