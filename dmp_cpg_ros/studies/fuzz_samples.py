@@ -24,7 +24,9 @@ from rosbags.typesys import Stores, get_typestore
 from dmp_cpg_ros import layouts
 from dmp_cpg_ros.analysis.bag import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
-from dmp_cpg_ros.analysis.run import write_results
+from dmp_cpg_ros.analysis.report import render
+from dmp_cpg_ros.analysis.run import RunResults, write_results
+from dmp_cpg_ros.analysis.story import story
 from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.analysis.topics import TOPICS
 from dmp_cpg_ros.commands import inspect_robot, learn, walk
@@ -254,13 +256,20 @@ def _suite(path: Path, _: Path) -> int:
 def _bag(path: Path, out: Path) -> int:
     payload_digests(path)
     context, _ = run_context({'gait': 'amble'})
-    write_results(out, load_recording(path), context, {}, report=False)
+    recording = load_recording(path)
+    results = write_results(out, recording, context, {}, report=False)
+    _report(results, story(recording, results.metrics))
     return 0
 
 
 def _run(path: Path, out: Path) -> int:
-    analyze_run(path, out=out, pictures=False, report=False)
+    _report(analyze_run(path, out=out, pictures=False, report=False))
     return 0
+
+
+def _report(results: RunResults, told: str = '') -> None:
+    """The report without its figures, which take a second."""
+    render('', '', results.metrics, results.manifest, {}, {}, told)
 
 
 def _by(load: Callable[[Path], Any]) -> Callable[[Path, Path], int]:

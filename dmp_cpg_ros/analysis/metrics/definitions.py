@@ -26,7 +26,8 @@ DEFINITIONS: dict[str, tuple[str, str]] = {
     'recording.undecodable_messages': ('',
         'messages on topics that the analysis reads that could not be decoded and were left out'),
     'robot.foot_slip_m': ('m',
-        'distance that contact points slid under load, summed over the four feet and the run'),
+        'distance that contact points slid under load, averaged over 40 ms, summed over the four '
+        'feet and the run'),
     'robot.foot_slip_m_per_foot_and_m': ('m/m', 'the same per foot and metre walked'),
     'tracking.v_rmse': ('m/s',
         'root mean square of measured minus reference forward speed, every sample'),
