@@ -221,17 +221,23 @@ find('hold').addEventListener('change', () => { if (!find('hold').checked) stick
 find('aside').addEventListener('dblclick', () => { find('aside').value = 0; });
 
 const DRIVING = ['ArrowUp', 'ArrowDown', 'ArrowLeft', 'ArrowRight', 'w', 'a', 's', 'd', 'q', 'e'];
+/** Name of a key: that of a letter does not depend on Shift and Caps Lock. */
+const key_of = (event) => (event.key.length === 1 ? event.key.toLowerCase() : event.key);
 window.addEventListener('keydown', (event) => {
   if (event.target.type === 'range' || event.ctrlKey || event.metaKey || event.altKey) return;
-  if (DRIVING.includes(event.key)) {
-    keys.add(event.key);
+  if (DRIVING.includes(key_of(event))) {
+    keys.add(key_of(event));
     event.preventDefault();
   } else if (event.key === ' ' && event.target.tagName !== 'BUTTON' && event.target.tagName !== 'INPUT') {
     find('inhibit').click();
     event.preventDefault();
   }
 });
-window.addEventListener('keyup', (event) => keys.delete(event.key));
+window.addEventListener('keyup', (event) => {
+  // Of a key that is released while Meta is held a Mac tells nothing.
+  if (event.key === 'Meta') keys.clear();
+  keys.delete(key_of(event));
+});
 window.addEventListener('blur', () => keys.clear());
 document.addEventListener('visibilitychange', () => { if (document.hidden) let_go(); });
 

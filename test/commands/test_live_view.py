@@ -381,6 +381,19 @@ def test_in_a_browser_the_robot_is_driven_pushed_and_stopped(
     assert frame['requested'] and frame['stop']['automatic'] == 'false'
 
 
+@pytest.mark.parametrize('released', ['W', 'Meta'])
+def test_a_key_that_is_released_with_shift_or_meta_drives_no_more(
+        client: Client, page: Page, released: str) -> None:
+    page.open(client.address, 900, 640)
+    ahead = "document.querySelector('#command').textContent.startsWith('0.50 m/s')"
+    page.until(f"document.querySelector('#robot').textContent && !({ahead})")
+    page.key('keyDown', 'w')
+    page.until(ahead)
+    page.key('keyUp', released)
+    page.until(f'!({ahead})')
+    assert not page.problems
+
+
 def test_a_gamepad_drives_and_stops_the_robot(client: Client, page: Page, ros: Ros) -> None:
     at_rest(client)
     references = heard(ros, 'reference')
