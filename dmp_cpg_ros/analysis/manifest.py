@@ -63,6 +63,7 @@ def versions() -> dict[str, str]:
 def host_facts() -> dict[str, Any]:
     """Facts that change how fast a run goes: processor, number of cores, load, system."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count()
+    load = os.getloadavg() if hasattr(os, 'getloadavg') else ()
     model = None
     with suppress(OSError):
         text = Path('/proc/cpuinfo').read_text(encoding='utf-8')
@@ -71,7 +72,7 @@ def host_facts() -> dict[str, Any]:
         'system': platform.system(), 'machine': platform.machine(),
         'processor': model[1] if model else platform.processor() or 'unknown',
         'cores': os.cpu_count(), 'usable_cores': usable,
-        'load_average': [round(value, 2) for value in os.getloadavg()],
+        'load_average': [round(value, 2) for value in load],
         'rmw': os.environ.get('RMW_IMPLEMENTATION', 'default')}
 
 

@@ -9,7 +9,6 @@ hostile: all that is unpacked of a file is bounded by its size.
 
 from __future__ import annotations
 
-import fcntl
 import filecmp
 import logging
 import os
@@ -33,6 +32,11 @@ from mcap.writer import MCAP0_MAGIC, Writer
 from dmp_cpg_ros.configuration import numbered
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.parameters import LONGEST_SHOWN, shown
+
+try:
+    import fcntl
+except ImportError:  # Windows, where no recorder of ours runs
+    fcntl = None  # type: ignore[assignment]
 
 _LOG = logging.getLogger(__name__)
 
@@ -205,7 +209,8 @@ def _copy(source: Path, target: Path, *, ros_only: bool) -> int:
     schemas, channels = {0: 0}, dict[int, int]()  # numbers in the copy by those in the file
     try:
         with source.open('rb') as file, target.open('wb') as copy:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            if fcntl is not None:
+                fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
             writer = Writer(copy)
             for record in _complete_records(file, Unpacker(source)):
                 match record:

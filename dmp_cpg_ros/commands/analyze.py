@@ -147,7 +147,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _analyze(options: argparse.Namespace, _: RosArguments) -> int:
-    with contextlib.suppress(AttributeError, OSError):  # another C library than glibc
+    # another C library than glibc, or, on Windows, none by this name
+    with contextlib.suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).mallopt(M_MMAP_THRESHOLD, LARGE)
 
     def export(recording: Recording) -> None:

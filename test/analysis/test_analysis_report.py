@@ -7,6 +7,8 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
+import subprocess
+import sys
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -360,6 +362,29 @@ def test_the_command_fills_the_runs_folder_and_keeps_its_manifest(
     metrics = json.loads((tmp_path / 'metrics.json').read_text())
     assert metrics['certificate'] == CERTIFICATE
     assert metrics['gait']['name'] == 'trot'
+
+
+WINDOWS = """
+import ctypes, os, sys
+for name in ('fcntl', 'resource', 'termios', 'pwd', 'grp'):
+    sys.modules[name] = None
+for name in ('getloadavg', 'sched_getaffinity', 'fork', 'getuid', 'geteuid'):
+    delattr(os, name)
+library = ctypes.CDLL.__init__
+def load(self, name, *rest, **more):
+    library(self, name + '' if name is None else name, *rest, **more)
+ctypes.CDLL.__init__ = load
+from dmp_cpg_ros.commands.analyze import main
+sys.exit(main(sys.argv[1:]))
+"""
+"""What is not on Windows, taken away."""
+
+
+def test_the_command_needs_nothing_that_windows_does_not_have(
+        walked: Recording, tmp_path: Path) -> None:
+    write_bag(walked, tmp_path / 'bag')
+    subprocess.run([sys.executable, '-c', WINDOWS, tmp_path, '--no-pictures'], check=True)
+    assert (tmp_path / 'report.html').is_file()
 
 
 def test_a_bare_bag_gets_its_results_beside_it(walked: Recording, tmp_path: Path) -> None:
