@@ -21,7 +21,7 @@ from dmp_cpg_ros.analysis.episodes import MOVING, requested_stops, steady_segmen
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import held, roll_pitch_yaw, stretches
 from dmp_cpg_ros.analysis.recording import Array, Recording
-from dmp_cpg_ros.analysis.strict_json import plain, write_json
+from dmp_cpg_ros.analysis.strict_json import plain, read_json, write_json
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Draw = Callable[[Array, Array, Array], Sequence[NDArray[np.uint8]]]
@@ -170,7 +170,7 @@ def write_results(
         What is known besides.
     manifest : mapping
         As from :func:`~dmp_cpg_ros.analysis.manifest.build_manifest`; written as
-        ``manifest.json``.
+        ``manifest.json`` unless that is what it says already.
     certificate : sequence, optional
         The inequalities, passed through.
     draw : callable, optional
@@ -190,7 +190,8 @@ def write_results(
     metrics: dict[str, Any] = plain(compute_metrics(recording, context, certificate))
     facts: dict[str, Any] = plain(manifest)
     write_json(folder / 'metrics.json', metrics)
-    write_json(folder / 'manifest.json', facts)
+    if read_json(folder / 'manifest.json') != facts:
+        write_json(folder / 'manifest.json', facts)
     if not report:
         return RunResults(folder, metrics, facts)
     from dmp_cpg_ros.analysis.report import render, write_figures

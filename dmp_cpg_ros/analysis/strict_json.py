@@ -7,11 +7,14 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import os
 from collections.abc import Mapping, Set
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from dmp_cpg_ros.core.errors import DataError
 
 
 def plain(value: Any) -> Any:
@@ -37,5 +40,34 @@ def to_json(value: Any) -> str:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write strict JSON as UTF-8."""
-    path.write_text(to_json(value), encoding='utf-8')
+    """Write strict JSON as UTF-8; a file that was there is replaced as a whole, or stays."""
+    text = to_json(value)
+    if path.exists() and not path.is_file():  # such as /dev/stdout
+        path.write_text(text, encoding='utf-8')
+        return
+    path = path.resolve()
+    new = path.with_name(f'.{path.name}.{os.getpid()}')
+    try:
+        new.write_text(text, encoding='utf-8')
+        os.replace(new, path)
+    finally:
+        new.unlink(missing_ok=True)
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read an earlier result; empty where there is none.
+
+    Raises
+    ------
+    DataError
+        If there is one that cannot be read.
+    """
+    try:
+        content = json.loads(path.read_text(encoding='utf-8'))
+    except (FileNotFoundError, NotADirectoryError):
+        return {}
+    except (OSError, ValueError, RecursionError) as error:
+        raise DataError(f"'{path}' cannot be read: {error}; repair or remove it") from None
+    if not isinstance(content, dict):
+        raise DataError(f"'{path}' must hold an object of JSON; repair or remove it")
+    return content

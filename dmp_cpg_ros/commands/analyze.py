@@ -22,7 +22,7 @@ from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.manifest import build_manifest
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.run import RunResults, write_results
-from dmp_cpg_ros.analysis.strict_json import write_json
+from dmp_cpg_ros.analysis.strict_json import read_json, write_json
 from dmp_cpg_ros.analysis.tables import (
     as_text,
     markdown_table,
@@ -31,7 +31,7 @@ from dmp_cpg_ros.analysis.tables import (
     write_parquet,
 )
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.commands.run_folder import picture_taker, read_json, run_context
+from dmp_cpg_ros.commands.run_folder import picture_taker, run_context
 from dmp_cpg_ros.core.errors import ParameterError
 
 BAG_ALONE = {'note': 'made from a bag alone: versions, commit and host are those of the analysis'}
@@ -80,7 +80,8 @@ def analyze_run(
     Raises
     ------
     MissingFileError, DataError, ParameterError
-        If there is no readable bag, or ``robot_file`` cannot be used.
+        If there is no readable bag, an earlier result cannot be read, or ``robot_file`` cannot be
+        used.
     """
     bag = find_bag(run_dir)
     run = _run_of(bag, Path(run_dir))

@@ -21,8 +21,9 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import held, smoothed, velocity_in_heading
 from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.strict_json import read_json
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.commands.run_folder import read_json, run_context
+from dmp_cpg_ros.commands.run_folder import run_context
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.robot.camera import Camera
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
-import json
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -104,15 +103,6 @@ def write_parameters(folder: Path, resolved: Mapping[str, Mapping[str, Any]]) ->
     path.write_text('# Parameters of every node of this run.\n'
                     + yaml.safe_dump(content, sort_keys=False), encoding='utf-8')
     return path
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Read an earlier result; empty where there is none that can be read."""
-    try:
-        content = json.loads(path.read_text(encoding='utf-8'))
-    except (OSError, ValueError, RecursionError):
-        return {}
-    return content if isinstance(content, dict) else {}
 
 
 def run_context(parameters: Mapping[str, Any] | None, robot_file: Path | str | None = None

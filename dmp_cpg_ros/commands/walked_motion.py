@@ -15,7 +15,8 @@ from dmp_cpg_ros.analysis import bag, episodes, motion
 from dmp_cpg_ros.analysis.context import find_parameter
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.commands.run_folder import read_json, run_context
+from dmp_cpg_ros.analysis.strict_json import read_json
+from dmp_cpg_ros.commands.run_folder import run_context
 from dmp_cpg_ros.core.canonical.phase import phase, phase_rate
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.body_scale import BodyScale

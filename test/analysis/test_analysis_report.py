@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import json
 import re
 import subprocess
@@ -37,6 +38,7 @@ from dmp_cpg_ros.analysis.recording import (
 from dmp_cpg_ros.analysis.report import CATALOGUE, FOLDED, SCRIPT, label, write_figures
 from dmp_cpg_ros.analysis.run import RunResults, moments, write_results
 from dmp_cpg_ros.analysis.story import MOST_POINTS, story
+from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.analysis.tables import flattened
 from dmp_cpg_ros.commands.analyze import analyze_run, main
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
@@ -362,6 +364,36 @@ def test_the_command_fills_the_runs_folder_and_keeps_its_manifest(
     metrics = json.loads((tmp_path / 'metrics.json').read_text())
     assert metrics['certificate'] == CERTIFICATE
     assert metrics['gait']['name'] == 'trot'
+
+
+def test_a_manifest_stays_as_it_is_and_one_that_cannot_be_read_is_refused(
+        walked: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_bag(walked, tmp_path / 'bag')
+    manifest = tmp_path / 'manifest.json'
+    manifest.write_text('{"scenario":   "a"}')
+    analyze_run(tmp_path, report=False)
+    assert manifest.read_text() == '{"scenario":   "a"}'
+    for text in ('{"scenario": "a', '[]'):
+        manifest.write_text(text)
+        assert main([str(tmp_path), '--no-pictures']) == BAD_INPUT
+        assert f"'{manifest}'" in capsys.readouterr().err
+        assert manifest.read_text() == text
+
+
+def test_a_disk_that_is_full_costs_no_earlier_result(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, write = tmp_path / 'metrics.json', Path.write_text
+    write_json(path, {'a': 1})
+
+    def half(to: Path, text: str, encoding: str) -> None:
+        write(to, text[:3], encoding)
+        raise OSError(errno.ENOSPC, 'full')
+
+    monkeypatch.setattr(Path, 'write_text', half)
+    with pytest.raises(OSError, match='full'):
+        write_json(path, {'a': 2})
+    assert json.loads(path.read_text()) == {'a': 1}
+    assert list(tmp_path.iterdir()) == [path]
 
 
 WINDOWS = """
