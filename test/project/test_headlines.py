@@ -7,7 +7,16 @@ from __future__ import annotations
 import re
 
 import pytest
-from headlines import README, STUDIES, headlines, missing, section, table_of_studies, tables
+from headlines import (
+    README,
+    STUDIES,
+    content,
+    headlines,
+    missing,
+    section,
+    table_of_studies,
+    tables,
+)
 
 from dmp_cpg_ros.configuration import find_config, load_yaml
 
@@ -39,6 +48,16 @@ def test_headlines_are_what_their_files_say() -> None:
 @pytest.mark.parametrize('study', STUDIES)
 def test_the_table_of_a_study_is_what_its_file_says(study: str) -> None:
     assert missing(study) == []
+
+
+def test_falls_are_counted() -> None:
+    fallen = [{'stands': False, 'tries': 2, 'seconds': 30.0, 'reason': 'gave up'}]
+    results = {robot: of + fallen for robot, of in content('falls').items()}
+    assert STUDIES['falls'].rows(results)[0].startswith('50 of 51 falls recovered to standing, ')
+    results = content('changes-of-gait')
+    fell = {'fell': True, 'duration': None, 'phase_error': None}
+    results['gaits'][0]['outcome'] |= fell
+    assert '60 changes: 1 fall, ' in STUDIES['changes-of-gait'].rows(results)[0]
 
 
 @pytest.mark.parametrize('study', ROWS)

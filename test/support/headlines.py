@@ -144,7 +144,8 @@ def gaits(results: Any) -> str:
     outcomes = [one['outcome'] for one in results['gaits']]
     names = {one['case']['before'] for one in results['gaits']}
     number = ('no', 'one', 'two', 'three', 'four', 'five', 'six')[len(names)]
-    digits, power = f'{max(one["phase_error"] for one in outcomes):.0e}'.split('e')
+    worst = max(one['phase_error'] for one in outcomes if not one['fell'])
+    digits, power = f'{worst:.0e}'.split('e')
     sign = str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))
     return (f'{len(outcomes)} changes between {number} gaits: '
             f'{sum(one["fell"] for one in outcomes) or "no"} fall, largest phase error '
@@ -245,19 +246,20 @@ def tightness_rows(rows: Any) -> list[str]:
 def fall_rows(results: Any) -> list[str]:
     """Sentence about falls, as the only row."""
     (of,) = results.values()
-    rolls = [sum(fall['tries'] == n for fall in of) for n in (0, 1, 2)]
-    return [f'{len(of)} of {len(of)} falls recovered to standing, {rolls[0]} without rolling, '
+    stood = [fall for fall in of if fall['stands']]
+    rolls = [sum(fall['tries'] == n for fall in stood) for n in (0, 1, 2)]
+    return [f'{len(stood)} of {len(of)} falls recovered to standing, {rolls[0]} without rolling, '
             f'{rolls[1]} with one roll, {rolls[2]} with two; '
-            f'{median(fall["seconds"] for fall in of):.1f} s in the median, '
-            f'{max(fall["seconds"] for fall in of):.1f} s at most.']
+            f'{median(fall["seconds"] for fall in stood):.1f} s in the median, '
+            f'{max(fall["seconds"] for fall in stood):.1f} s at most.']
 
 
 def gait_rows(results: Any) -> list[str]:
     """Sentence about changes of gait, as the only row."""
     outcomes = [one['outcome'] for one in results['gaits']]
-    durations = [one['duration'] for one in outcomes]
-    worst = gaits(results).rpartition(', ')[2]
-    return [f'{len(outcomes)} changes: no fall, {worst}, done after {min(durations):.1f} to '
+    durations = [one['duration'] for one in outcomes if not one['fell']]
+    found = gaits(results).partition(': ')[2]
+    return [f'{len(outcomes)} changes: {found}, done after {min(durations):.1f} to '
             f'{max(durations):.1f} s.']
 
 
