@@ -96,6 +96,11 @@ def _number(value: float, digits: int) -> str:
     return '-' if isnan(value) else f'{value:.{digits}f}'
 
 
+def _largest(values: Sequence[float], form: str) -> str:
+    """Largest number as a cell: ``nan`` where one is none, ``-`` where there are none."""
+    return f'{np.max(values):{form}}' if values else '-'
+
+
 def delays(workers: Workers, seeds: int, phases: int) -> Table:
     """Falls and speed by the delay of the targets, without a lead and with one that covers it."""
     cells = [(gait, speed, delay, lead)
@@ -141,7 +146,7 @@ def mismatch(workers: Workers, seeds: int, phases: int) -> Table:
         errors = [100.0 * trials.relative_error(one, (speed, 0.0, 0.0))
                   for one in of if not one.fell]
         rows.append((what, f'{gait} {speed:g}', f'{seeds - len(errors)}/{seeds}', *(
-            (f'{np.median(errors):.1f}', f'{max(errors):.1f}') if errors else ('-', '-'))))
+            (f'{np.median(errors):.1f}', f'{np.max(errors):.1f}') if errors else ('-', '-'))))
     return Table('Robots that are not as their controllers know them',
                  ('not known', 'gait, m/s', 'fell', 'error of speed %, median', 'worst'),
                  rows, results)
@@ -157,7 +162,7 @@ def gaits(workers: Workers, seeds: int, phases: int) -> Table:
     for before, after in sorted({(case['before'], one.after) for case, one in results}):
         of = [one for case, one in results if (case['before'], one.after) == (before, after)]
         upright = [one for one in of if not one.fell]
-        worst = [f'{max(getattr(one, name) for one in upright):{form}}' if upright else '-'
+        worst = [_largest([getattr(one, name) for one in upright], form)
                  for name, form in (('duration', '.2f'), ('cycles', '.1f'),
                                     ('phase_error', '.1e'), ('sway', '.0f'))]
         rows.append((f'{before} to {after}', str(len(of)), str(len(of) - len(upright)),
@@ -185,8 +190,8 @@ def fast_gaits(workers: Workers, seeds: int, phases: int) -> Table:
         upright = [one for _, one in of if not one.fell]
         rows.append((Path(file).stem, str(len(of)), str(len(fallen)),
                      ', '.join(dict.fromkeys(fallen)) or '-',
-                     f'{max(one.duration for one in upright):.1f}',
-                     f'{max(one.sway for one in upright):.0f}'))
+                     _largest([one.duration for one in upright], '.1f'),
+                     _largest([one.sway for one in upright], '.0f')))
     return Table('Gaits changed at the highest speeds, forwards and backwards',
                  ('robot', 'changes', 'fell', 'these', 'longest s',
                   'largest roll or pitch deg'), rows, results)
@@ -200,7 +205,8 @@ def restarts(workers: Workers, seeds: int, phases: int) -> Table:
     return Table('Posture control begins anew', (
         'gait, m/s', 'restarts', 'fell', 'largest tilt deg, median', 'worst'), [
             (f'{case["gait"]} {case["speed"]:g}', str(len(of)), str(sum(one.fell for one in of)),
-             f'{np.median([one.tilt for one in of]):.0f}', f'{max(one.tilt for one in of):.0f}')
+             f'{np.median([one.tilt for one in of]):.0f}',
+             _largest([one.tilt for one in of], '.0f'))
             for case, of in walks], results)
 
 
@@ -233,8 +239,8 @@ def run_robot(file: str, phases: int) -> dict[str, Any]:
         'trot': trials.steady('trot', (1.0, 0.0, 0.0), file), 'top_speed': _top_speed(file),
         'stops': phases, 'stood': stops.number('standing'),
         'walked_on': stops.number('walked_on'), 'stop_falls': stops.number('fell'),
-        'pushed': min(min(push_trials.survived_pushes('amble', 0.5, phase, given.SIDES, file))
-                      for phase in shares)}
+        'pushed': float(np.min([push_trials.survived_pushes('amble', 0.5, phase, given.SIDES, file)
+                                for phase in shares]))}
 
 
 def _top_speed(file: str) -> float:

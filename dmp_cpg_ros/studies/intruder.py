@@ -6,7 +6,8 @@
 real time unless ``--lock-step`` is given, and publishes forged messages, replays, garbage and
 floods on every topic of the suite, parameter events and requests, and transitions that are not
 possible. After each attack it looks whether the robot is on its feet and at its speed, and how
-soon the intruder was named on ``/diagnostics``. Exit status 1 when an attack succeeded.
+soon the intruder was named on ``/diagnostics``. Exit status 1 when an attack succeeded, or whoever
+attacked was not named.
 
 The documented services and ``cmd_vel`` are open to everybody and are not attacked; neither are
 requests that are valid, such as deactivating a node, which only DDS Security can refuse.
@@ -20,13 +21,14 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import nan, remainder, tau
+from math import isfinite, nan, remainder, tau
 from pathlib import Path
 
+import numpy as np
 import rclpy
 
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
-from dmp_cpg_ros.studies.intruder_attacks import ATTACKS, LAST_S
+from dmp_cpg_ros.studies.intruder_attacks import ATTACKS, LAST_S, NOTHING
 from dmp_cpg_ros.studies.intruder_node import Intruder
 from dmp_cpg_ros.studies.output import markdown_table
 from dmp_cpg_ros.studies.process_usage import children, resident_mb
@@ -63,6 +65,11 @@ class Outcome:
         """Whether the robot walked on as commanded."""
         return (not self.fell and SLOWEST <= self.speed <= FASTEST
                 and abs(self.turned) <= MOST_TURNED)
+
+    @property
+    def told(self) -> bool:
+        """Whether the intruder was named where it did something."""
+        return self.attack == NOTHING or isfinite(self.named_s)
 
 
 class Suite:
@@ -166,7 +173,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(table(outcomes))
     print(f'{node.sent:,} messages and requests, seed {options.seed}; memory of the suite at the '
           f'begin {suite.begin_mb:.0f} MB, at the end {memory:.0f} MB')
-    return int(not all(outcome.walked_on for outcome in outcomes))
+    return int(not all(outcome.walked_on and outcome.told for outcome in outcomes))
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
@@ -175,12 +182,12 @@ def table(outcomes: Sequence[Outcome]) -> str:
     for name in ATTACKS:
         of = [outcome for outcome in outcomes if outcome.attack == name]
         if of:
-            late = max(outcome.named_s for outcome in of)
+            late = np.max([outcome.named_s for outcome in of])
             rows.append((name, str(len(of)), f'{sum(outcome.messages for outcome in of):,}',
                          str(sum(outcome.fell for outcome in of)),
                          str(sum(not outcome.walked_on for outcome in of)),
                          f'{max(abs(outcome.turned) for outcome in of):.2f} rad',
-                         '-' if late != late else f'{late:.1f} s'))
+                         f'{late:.1f} s' if isfinite(late) else '-'))
     return markdown_table(('attack', 'times', 'messages', 'falls', 'did not walk on', 'turned',
                            'named within'), rows)
 

@@ -41,6 +41,9 @@ ATTACK_S = 2.0
 LAST_S = 36_000
 """Length of the walk, which nobody waits for [s]."""
 
+NOTHING = 'nothing'
+"""Attack that is none, for comparison."""
+
 OWN = tuple(topic for topic in TOPICS if topic.publishers != ('user',) and topic.recorded
             and topic.name not in ('/clock', '/diagnostics', 'joint_work', 'odom', '/tf'))
 """Topics that only nodes of the suite may write."""
@@ -223,7 +226,7 @@ def _second_robot(node: Intruder) -> None:
 
 
 ATTACKS: dict[str, Callable[[Intruder], None]] = {
-    'nothing': lambda node: node.spin(ATTACK_S),
+    NOTHING: lambda node: node.spin(ATTACK_S),
     'bytes that are no message, on all topics': _bytes_on_all,
     'mutated messages': _mutants,
     **{f'stamps of {name}': _stamps(name) for name in TICKED},

@@ -52,9 +52,11 @@ def least_and_median(outcomes: Sequence[Sequence[float]]) -> Iterator[str]:
 
 
 def tell(tables: Iterator[tuple[str, Table]], file: Path | None) -> None:
-    """Print tables, each as soon as it is there, and write cases and outcomes by their names."""
+    """Print tables, each as soon as it is there, and write cases and outcomes of those so far by
+    their names.
+    """
     results: dict[str, Any] = {}
     for name, table in tables:
         print(f'{table.title}\n\n{markdown_table(table.columns, table.rows)}\n', flush=True)
         results[name] = [{'case': case, 'outcome': outcome} for case, outcome in table.results]
-    write_results(file, results)
+        write_results(file, results)

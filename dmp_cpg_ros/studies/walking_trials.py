@@ -292,7 +292,8 @@ class ChangeOutcome:
     fell : bool
         Whether the robot fell, before or after.
     duration : float
-        From the request until the new gait is in force [s].
+        From the request until the new gait is in force [s]; NaN where it was not within
+        ``WATCHED``.
     cycles : float
         The same in cycles of the new gait.
     phase_error : float
@@ -350,7 +351,8 @@ def _changed(run: Walk, fell: ChangeOutcome) -> ChangeOutcome:
         if network.gait.name == fell.after and isnan(duration):
             duration = (k + 1) * run.tick_s
     period = run.period()
-    settled = errors[round((duration + CYCLES_AFTER * period) / run.tick_s):]
+    settled = [] if isnan(duration) else errors[
+        round((duration + CYCLES_AFTER * period) / run.tick_s):]
     sway = float(np.abs(np.rad2deg(attitude(run.states)[:, :2])).max())
     return replace(fell, fell=False, duration=duration, cycles=duration / period,
                    phase_error=max(errors), sway=sway,

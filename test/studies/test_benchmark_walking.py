@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import replace
 from functools import lru_cache
 from math import isnan, nan, pi
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,10 +22,17 @@ from dmp_cpg_ros.studies.output import markdown_table
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.studies import walking_trials
-from dmp_cpg_ros.studies.benchmark_walking import main, steady_cells
+from dmp_cpg_ros.studies.benchmark_walking import _largest, main, steady_cells
 from dmp_cpg_ros.studies.loop_recording import recording_of
 from dmp_cpg_ros.studies.push_trials import survives
-from dmp_cpg_ros.studies.walking_trials import SteadyOutcome, Walk, cross, relative_error
+from dmp_cpg_ros.studies.trial_tables import Table, tell
+from dmp_cpg_ros.studies.walking_trials import (
+    ChangeOutcome,
+    SteadyOutcome,
+    Walk,
+    cross,
+    relative_error,
+)
 
 
 def test_the_error_is_along_the_command() -> None:
@@ -96,6 +106,29 @@ def test_a_crossing_ends_at_the_finish_or_on_the_ground(monkeypatch: pytest.Monk
     assert flat.time == pytest.approx(2.5 / 0.8, rel=0.2)
     wall = cross('trot', 'steps', {'height': 0.5}, 0, speed=0.8)
     assert not wall.crossed and wall.distance < 2.0
+
+
+def test_a_change_that_is_not_done_in_time_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = Walk('amble')
+    assert run.reach((0.4, 0.0, 0.0))
+    monkeypatch.setattr(walking_trials, 'WATCHED', 0.1)
+    outcome = walking_trials._changed(run, ChangeOutcome('trot', 0.0, fell=True))
+    assert not outcome.fell and isnan(outcome.duration) and not outcome.in_time
+
+
+def test_what_tables_were_made_of_is_there_when_a_later_one_fails(tmp_path: Path) -> None:
+    def tables() -> Iterator[tuple[str, Table]]:
+        yield 'first', Table('First', ('a',), (('1',),), [({'v': 1}, 2)])
+        raise ValueError('no second')
+
+    with pytest.raises(ValueError, match='no second'):
+        tell(tables(), tmp_path / 'file.json')
+    assert json.loads((tmp_path / 'file.json').read_text()) == {
+        'first': [{'case': {'v': 1}, 'outcome': 2}]}
+
+
+def test_no_number_is_the_largest_and_of_none_there_is_none() -> None:
+    assert (_largest([1.0, nan, 2.0], '.1f'), _largest([], '.1f')) == ('nan', '-')
 
 
 def test_parameters_of_a_case_reach_the_walk() -> None:

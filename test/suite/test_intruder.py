@@ -4,10 +4,26 @@
 
 from __future__ import annotations
 
+from math import nan
+
+import pytest
+
+pytest.importorskip('rclpy')
+
 import ros_processes
 from ros_processes import Processes
 
+from dmp_cpg_ros.studies.intruder import Outcome, table
+
 processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
+
+
+def test_an_intruder_that_is_not_named_is_in_the_table_and_counts() -> None:
+    outcomes = [Outcome('body_mode', 9, False, 0.5, 0.0, named) for named in (0.2, nan, 0.1)]
+    assert [outcome.told for outcome in outcomes] == [True, False, True]
+    assert all(outcome.walked_on for outcome in outcomes)
+    assert table(outcomes).split()[-2] == '-'
+    assert Outcome('nothing', 0, False, 0.5, 0.0, nan).told
 
 
 def test_forged_targets_do_not_keep_the_robot_from_walking(processes: Processes) -> None:
