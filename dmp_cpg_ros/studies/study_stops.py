@@ -33,7 +33,7 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.inhibition import AUTO
 from dmp_cpg_ros.core.certificates.certify import certify
-from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.robot_model.grounds import World
 from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
@@ -244,18 +244,44 @@ def run_cases(cases: Sequence[StopCase], file: str | None, workers: Workers,
               record: Path | None = None) -> Results:
     """Run cases; the results do not depend on the workers, nor on how much of them a record holds
     already.
+
+    Raises
+    ------
+    DataError
+        If the record holds other cases.
     """
     outcomes: list[StopOutcome] = []
     if record is not None and record.exists():
-        outcomes = [StopOutcome(**json.loads(line)) for line in record.read_text().splitlines()]
+        outcomes = _recorded(record, cases)
     walks = [list(group) for _, group in groupby(
         cases[len(outcomes):], lambda case: (*_key(case), case.friction, case.payload))]
     with workers, open(record or os.devnull, 'a', encoding='utf-8') as kept:
         for of_walk in workers.map(partial(run_walk, file=file), walks):
+            now = zip(cases[len(outcomes):], of_walk, strict=False)
+            print(*(json.dumps({'case': vars(case), 'outcome': vars(outcome)})
+                    for case, outcome in now), sep='\n', file=kept, flush=True)
             outcomes += of_walk
-            print(*(json.dumps(vars(outcome)) for outcome in of_walk), sep='\n', file=kept,
-                  flush=True)
     return list(zip(cases, outcomes[:len(cases)], strict=True))
+
+
+def _recorded(record: Path, cases: Sequence[StopCase]) -> list[StopOutcome]:
+    """Outcomes of the first cases; a last line that was not written to its end is dropped."""
+    data = record.read_bytes()
+    whole = data[:data.rfind(b'\n') + 1]
+    outcomes = []
+    for number, (line, case) in enumerate(zip(whole.splitlines(), cases, strict=False), 1):
+        try:
+            entry = json.loads(line)
+            known = StopCase(**entry['case'])
+            outcomes.append(StopOutcome(**entry['outcome']))
+        except (ValueError, KeyError, TypeError):
+            raise DataError(f"'{record}', line {number}, is no recorded stop; name another file "
+                            'with --record') from None
+        if known != case:
+            raise DataError(f"'{record}', line {number}, is of another stop, {known}, than "
+                            f'{case}; name another file with --record, or the options of then')
+    os.truncate(record, len(whole))
+    return outcomes
 
 
 def run_trials(robot: MujocoRobot, cases: Sequence[StopCase], parameters: SuiteParameters,

@@ -16,6 +16,7 @@ import pytest
 from core_examples import TICK, quadruped, standing_state
 
 from dmp_cpg_ros.analysis.recording import FootForceSeries, JointSeries, OdometrySeries, Recording
+from dmp_cpg_ros.core.errors import DataError
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary, body_at_rest
@@ -97,8 +98,16 @@ def test_a_record_is_gone_on_with_and_changes_nothing(tmp_path: Path) -> None:
     first = run_cases(cases[:1], None, Workers(1), record)
     both = run_cases(cases, None, Workers(1), record)
     assert str(both) == str(run_cases(cases, None, Workers(2))) and str(both[:1]) == str(first)
-    assert len(record.read_text(encoding='utf-8').splitlines()) == 2
+    lines = record.read_text(encoding='utf-8').splitlines()
+    assert len(lines) == 2
     assert not any(outcome.broken for _, outcome in both)
+    record.write_text(f'{lines[0]}\n{lines[1][:40]}', encoding='utf-8')  # interrupted
+    assert str(run_cases(cases, None, Workers(1), record)) == str(both)
+    assert record.read_text(encoding='utf-8').splitlines() == lines
+    for others, why in ((cases[1:], 'line 1, is of another stop'), (cases, 'is no recorded stop')):
+        with pytest.raises(DataError, match=why):
+            run_cases(others, None, Workers(1), record)
+        record.write_text('{"fell": false}\n', encoding='utf-8')
 
 
 @pytest.mark.parametrize(('speed', 'force'), [(0.02, 20.0), (0.0, 1.0)])
