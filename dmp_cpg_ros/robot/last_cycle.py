@@ -65,13 +65,13 @@ class LastCycle:
         if count < first + compared:
             return None
         times = GRID_S * np.arange(-count, 1, dtype=np.float64)
-        memory = np.concatenate([_sampled(heard, end_ns, times) for heard in self._heard], axis=2)
+        memory = np.concatenate([_sampled(_since(heard, end_ns - round(1e9 * GRID_S * count)),
+                                          end_ns, times) for heard in self._heard], axis=2)
         position = memory[:, 0]
         spread = position[-first:].var(axis=0).sum()
         lags = np.arange(first, count - compared + 1)
-        ends = position[-compared:]
-        off = np.array([((ends - position[-compared - lag:-lag]) ** 2).sum(axis=1).mean()
-                        for lag in lags])
+        parts = np.lib.stride_tricks.sliding_window_view(position, compared, axis=0)
+        off = ((parts[-1] - parts[-1 - lags]) ** 2).sum(axis=1).mean(axis=1)
         best = off.argmin()
         if not off[best] <= ALIKE * spread:
             return None
@@ -109,7 +109,17 @@ class Rhythm:
         return result
 
 
-def _sampled(heard: deque[tuple[int, Array]], end_ns: int, times: Array) -> Array:
+def _since(heard: deque[tuple[int, Array]], begin_ns: int) -> list[tuple[int, Array]]:
+    """What a leg sent from a time on, and the last before it."""
+    found = []
+    for entry in reversed(heard):
+        found.append(entry)
+        if entry[0] < begin_ns:
+            break
+    return found[::-1]
+
+
+def _sampled(heard: list[tuple[int, Array]], end_ns: int, times: Array) -> Array:
     """What a leg sent, (n, 3, 3), at times before an end [s]."""
     stamps = np.array([stamp - end_ns for stamp, _ in heard]) * 1e-9
     values = np.array([value.ravel() for _, value in heard])
