@@ -219,6 +219,17 @@ def test_the_steady_speed_error_is_found(ratio: float) -> None:
     assert tracking['v_error_max'] == pytest.approx(abs(ratio - 1.0), abs=1e-3)
 
 
+def test_an_error_of_sidesteps_counts() -> None:
+    walk = SyntheticWalk(speed_ratio=0.8)
+    recording, aside = walk.recording(), [1, 0, 2]
+    reference, odometry = recording.reference, recording.odometry
+    tracking = metrics_of(
+        walk, reference=dataclasses.replace(reference, value=reference.value[:, aside]),
+        odometry=dataclasses.replace(
+            odometry, velocity_in_base=odometry.velocity_in_base[:, aside]))['tracking']
+    assert tracking['v_error_max'] == pytest.approx(0.2, abs=1e-3)
+
+
 def test_perfect_tracking_has_no_error(plain_metrics: dict[str, Any]) -> None:
     assert plain_metrics['tracking']['v_rmse'] < 1e-12
     assert plain_metrics['tracking']['gamma_rmse'] < 1e-12

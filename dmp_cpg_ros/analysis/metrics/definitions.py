@@ -37,7 +37,8 @@ DEFINITIONS: dict[str, tuple[str, str]] = {
     'tracking.v_y_rmse_cycle': ('m/s', 'lateral speed error after averaging over a gait cycle'),
     'tracking.gamma_rmse_cycle': ('rad/s', 'turn rate error after averaging over a gait cycle'),
     'tracking.v_error_max': ('',
-        'largest relative error of mean forward speed among stretches of constant reference'),
+        'largest relative error of mean speed, along the direction of the reference, among '
+        'stretches of constant reference'),
     'estimation.v_x_rmse': ('m/s',
         'root mean square of estimated minus true forward velocity of the base, at the '
         "estimate's stamps"),

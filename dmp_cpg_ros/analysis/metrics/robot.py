@@ -166,7 +166,7 @@ def tracking_metrics(recording: Recording) -> dict[str, Any]:
         run of measured minus reference at every instant; with ``_cycle`` after averaging over a
         gait cycle, which leaves the sway of every step out; ``steady``: one entry per stretch of
         constant reference with means over whole gait cycles, and ``v_error_max``, the largest
-        relative error of forward speed among them.
+        relative error of the speed among them.
     """
     odometry, reference, steady = recording.odometry, recording.reference, steady_errors(recording)
     found: list[float] = []
@@ -196,9 +196,9 @@ def steady_errors(recording: Recording) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        ``start_s``, ``end_s``, ``cycles``, ``v``, ``v_reference``, ``v_error`` (relative; None
-        when the reference does not go forward), ``v_y``, ``gamma``, ``gamma_reference``,
-        ``gamma_error`` (relative, None when straight).
+        ``start_s``, ``end_s``, ``cycles``, ``v``, ``v_reference``, ``v_error`` (of the
+        speed along the direction of the reference, relative; None when that goes nowhere),
+        ``v_y``, ``gamma``, ``gamma_reference``, ``gamma_error`` (relative, None when straight).
     """
     odometry, reference, entries = recording.odometry, recording.reference, []
     if not odometry.time.size:
@@ -211,10 +211,15 @@ def steady_errors(recording: Recording) -> list[dict[str, Any]]:
         cycles = round(episodes.cycle_count(recording, start, end))
         entries.append({
             'start_s': start, 'end_s': end, 'cycles': cycles,
-            'v': v, 'v_reference': v_r, 'v_error': _relative(v, v_r),
+            'v': v, 'v_reference': v_r, 'v_error': _relative_along((v, v_y), (v_r, v_y_r)),
             'v_y': v_y, 'v_y_reference': v_y_r,
             'gamma': gamma, 'gamma_reference': gamma_r, 'gamma_error': _relative(gamma, gamma_r)})
     return entries
+
+
+def _relative_along(value: tuple[float, float], reference: tuple[float, float]) -> float | None:
+    speed = float(np.hypot(*reference))
+    return _relative(float(np.dot(value, reference)) / speed, speed) if speed else None
 
 
 def _relative(value: float, reference: float) -> float | None:
