@@ -94,10 +94,13 @@ def _stops(metrics: Mapping[str, Any]) -> list[Fact]:
     found = []
     for word, end, aim in (
             ('stop', 'came to rest', 'rest'), ('start', 'led to walking', 'walking')):
-        entries, done, count = (metrics[word][key] for key in ('all', 'completed', 'count'))
+        entries, done, count, overruled = (
+            metrics[word][key] for key in ('all', 'completed', 'count', 'overruled'))
         if entries:
-            found += [Fact(f'Every {word} {end}', f'{done} of {count}', done == count),
-                      *_predictions(entries, aim)]
+            apart = f'; another request ended {overruled} before' if overruled else ''
+            asked = count - overruled
+            found += [Fact(f'Every {word} {end}', f'{done} of {asked}{apart}',
+                           done == asked if asked else None), *_predictions(entries, aim)]
     if speeds := _known(metrics['stop']['all'], 'body_speed_at_rest_m_s'):
         fastest, = max(speeds)
         found.append(Fact('The body stood still at rest', f'at most {1e3 * fastest:.2g} mm/s',

@@ -47,6 +47,7 @@ def test_an_empty_recording_has_no_numbers() -> None:
         'measured_s': None,
         'count': 0,
         'completed': 0,
+        'overruled': 0,
         'all': 0,
     }
     assert json.loads(to_json(metrics)) == metrics
@@ -350,6 +351,23 @@ def test_a_stop_that_never_came_to_rest_counts_as_asked_only() -> None:
     events = tuple(event for event in walk.events() if event.message != 'at_rest')
     stop = metrics_of(walk, inhibition=events)['stop']
     assert (stop['count'], stop['completed'], stop['measured_s']) == (1, 0, None)
+
+
+def test_a_stop_that_another_request_ended_is_counted_apart() -> None:
+    walk = SyntheticWalk()
+    free, waiting, captured, at_rest, releasing, walking = walk.events()
+    later = [dataclasses.replace(event, time=event.time + 3.0) for event in (
+        waiting, captured, at_rest, releasing, walking)]
+    metrics = metrics_of(walk, inhibition=(free, waiting, captured, releasing, walking, *later))
+    stop, told = metrics['stop'], {fact.statement: fact for fact in facts(metrics)}
+    assert (stop['count'], stop['completed'], stop['overruled']) == (2, 1, 1)
+    assert [entry['overruled'] for entry in stop['all']] == [True, False]
+    rested = told['Every stop came to rest']
+    assert rested.holds and rested.finding == '1 of 1; another request ended 1 before'
+    metrics = metrics_of(walk, inhibition=(free, waiting, captured, releasing))
+    told = {fact.statement: fact for fact in facts(metrics)}
+    assert told['Every stop came to rest'].holds is None
+    assert told['Every start led to walking'].holds is False  # the recording ended before
 
 
 def test_standing_before_the_first_start_is_no_stop() -> None:

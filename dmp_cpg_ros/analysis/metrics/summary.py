@@ -37,12 +37,13 @@ def _summary(entries: list[dict[str, Any]]) -> dict[str, Any]:
     slowest = max(completed, key=lambda entry: float(entry['measured_s']), default={})
     return {
         **{key: slowest.get(key) for key in ('predicted_s', 'bound_s', 'measured_s')},
-        'count': len(entries), 'completed': len(completed), 'all': entries}
+        'count': len(entries), 'completed': len(completed),
+        'overruled': sum(entry['overruled'] for entry in entries), 'all': entries}
 
 
 def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[str, Any]:
     at_rest = next((event for event in episode.events if event.message == 'at_rest'), None)
-    entry = {**_times(episode, at_rest), 'distance_bound_m': _first(episode, 'bound_m')}
+    entry = {**_times(recording, episode, at_rest), 'distance_bound_m': _first(episode, 'bound_m')}
     if at_rest is None:
         return entry
     end = episodes.stands_until(recording, at_rest.time, episode.end)
@@ -54,12 +55,15 @@ def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[s
 
 def _start(recording: Recording, start: Episode) -> dict[str, Any]:
     """Times of a start; one that another state than walking follows was interrupted."""
-    return _times(start, next((event for event in recording.inhibition if event.time == start.end
-                               and event.message in episodes.RUNNING), None))
+    return _times(recording, start, next((
+        event for event in recording.inhibition
+        if event.time == start.end and event.message in episodes.RUNNING), None))
 
 
-def _times(episode: Episode, done: StatusEvent | None) -> dict[str, Any]:
-    """Request, prediction, bound and measurement; the node's own numbers where it states them."""
+def _times(recording: Recording, episode: Episode, done: StatusEvent | None) -> dict[str, Any]:
+    """Request, prediction, bound and measurement; the node's own numbers where it states them;
+    and whether another request ended it before it was done.
+    """
     first = episode.events[0]
     stated = first.number('request_stamp')
     # a stamp far from the event that bears it belongs to another request
@@ -67,8 +71,12 @@ def _times(episode: Episode, done: StatusEvent | None) -> dict[str, Any]:
     measured = None if done is None else done.number('measured_s')
     if done is not None and measured is None:
         measured = done.time - request
+    following = next((event for event in recording.inhibition
+                      if event.time >= episode.end and event not in episode.events), first)
     return {'request_s': request, 'predicted_s': _first(episode, 'predicted_s'),
-            'bound_s': _first(episode, 'bound_s'), 'measured_s': measured}
+            'bound_s': _first(episode, 'bound_s'), 'measured_s': measured,
+            'overruled': measured is None and (
+                following.values.get('requested') != first.values.get('requested'))}
 
 
 def _first(episode: Episode, key: str) -> float | None:
