@@ -47,6 +47,9 @@ LONGEST_COMMAND = 1000
 MOST_STREAMS = 8
 """Browsers that may look on."""
 
+MOST_CONNECTIONS = 32
+"""Connections at a time, each a thread; those beyond are closed, whoever they are of."""
+
 PATIENCE_S = 15.0
 """How long a browser may leave the server waiting [s]."""
 
@@ -119,6 +122,7 @@ class ViewServer(ThreadingHTTPServer):
                  take: Callable[[Any], Any], port: int = 0) -> None:
         """Listen; :meth:`serve_forever` serves."""
         self.token, self.frames, self.scene, self.take = token, frames, scene, take
+        self._room = threading.Semaphore(MOST_CONNECTIONS)
         for candidate in (port,) if port else (*range(PORT, PORT + PORTS), 0):
             try:
                 super().__init__((LOOPBACK, candidate), _Request)
@@ -131,6 +135,20 @@ class ViewServer(ThreadingHTTPServer):
     def address(self) -> str:
         """Address of the page, with the token."""
         return f'http://{LOOPBACK}:{self.server_port}/?token={self.token}'
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Begin a thread for a connection if there is room for it."""
+        if self._room.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Serve a connection, and make room."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._room.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Say nothing of connections that break off; whatever else a request does wrong is

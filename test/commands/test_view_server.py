@@ -189,6 +189,28 @@ def test_there_is_room_for_some_viewers_and_who_leaves_makes_room(
     assert served.ask('/frames').status == 200
 
 
+def test_connections_beyond_the_most_are_closed_and_who_leaves_makes_room(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(view_server, 'MOST_CONNECTIONS', 2)
+    site = Served()
+    address = ('127.0.0.1', site.server.server_port)
+    waiting = [socket.create_connection(address, 30) for _ in range(2)]
+    with socket.create_connection(address, 30) as third:
+        assert third.recv(1) == b''
+    for end in waiting:
+        end.close()
+
+    def answered() -> bool:
+        try:
+            return site.ask('/scene').status == 204
+        except (http.client.HTTPException, OSError):
+            return False
+
+    wait_until(answered, what=lambda: 'room for a connection')
+    site.server.shutdown()
+    site.server.server_close()
+
+
 def test_the_page_fetches_nothing_from_elsewhere_and_all_of_it_is_served() -> None:
     names = {path.name for path in PAGE.iterdir()}
     of_paper = {'paper.html', 'paper.js'}  # a page of their own, which nobody serves
