@@ -16,7 +16,7 @@ from typing import Any
 import rclpy
 import yaml
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
-from rclpy.parameter import Parameter, get_parameter_value, parameter_value_to_python
+from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.commands.ros_arguments import number, positive
@@ -29,7 +29,8 @@ from dmp_cpg_ros.commands.suite_client import (
     velocity_command,
 )
 from dmp_cpg_ros.commands.teleop import AXES, HELD, drive, steer
-from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+from dmp_cpg_ros.configuration import parse_yaml
+from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.nodes.framework.parameters import plain
 from dmp_cpg_ros.nodes.messages.commands import push_force
@@ -91,6 +92,10 @@ def parameter(client: SuiteClient, options: argparse.Namespace) -> None:
     action, node, name, value = options.action, options.node, options.name, options.value
     if (action == 'list') != (name is None) or (action == 'set') != (value is not None):
         raise ParameterError('param takes: list NODE, get NODE NAME, or set NODE NAME VALUE')
+    try:
+        given = parse_yaml(value or '', f"'{name}'")
+    except DataError as error:
+        raise ParameterError(str(error)) from None
     client.meet(['inhibition'])
     # The one that must not be repeated first: see SuiteClient.
     setting, getting, listing = (
@@ -105,13 +110,18 @@ def parameter(client: SuiteClient, options: argparse.Namespace) -> None:
     if action == 'get':
         print(plain(parameter_value_to_python(known[0])))
         return
-    given = parameter_value_to_python(get_parameter_value(value))
     if known[0].type == Parameter.Type.DOUBLE.value and type(given) is int:
         given = float(given)
     if known[0].type == Parameter.Type.STRING.value and not isinstance(given, str):
         given = value
+    if type(given) is int and not -2**63 <= given < 2**63:
+        raise ParameterError(f"'{name}': an integer has at most 64 bits")
     client.meet([], setting)
-    change = SetParameters.Request(parameters=[Parameter(name, value=given).to_parameter_msg()])
+    try:
+        changed = Parameter(name, value=given)
+    except TypeError:  # what no parameter can be; the node says of which type it is
+        changed = Parameter(name, value=value)
+    change = SetParameters.Request(parameters=[changed.to_parameter_msg()])
     result = client.answer([setting.call_async(change)], setting.service_name).results[0]
     if not result.successful:
         raise ClientError(f'Setting parameter failed: {result.reason}')

@@ -204,6 +204,10 @@ def test_parameters_are_read_set_and_refused_with_the_reason(suite: Processes) -
     assert said(suite, 'param', 'get', owner, 'cadence_scale') == '1.0'
     assert "has no parameter 'rhoo'" in refused(suite, 'param', 'get', owner, 'rhoo')
     assert 'param takes' in refused(suite, 'param', 'get', owner, status=2)
+    assert "'rho', line 1" in refused(suite, 'param', 'set', owner, 'rho', "'x", status=2)
+    assert '64 bits' in refused(
+        suite, 'param', 'set', 'mujoco_robot', 'seed', '9' * 30, status=2)
+    assert 'failed' in refused(suite, 'param', 'set', owner, 'rho', '[1, a]')
     fault = '{component: encoder, kind: stuck, for_s: 0.5, leg: fl}'
     assert 'failures_allowed' in refused(suite, 'param', 'set', 'mujoco_robot', 'fail', fault)
 
