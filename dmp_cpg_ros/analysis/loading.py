@@ -147,12 +147,12 @@ def _rows(block: Block, widths: Sequence[int]) -> list[Array]:
 
 def _work(topic: Topic, names: Sequence[str]) -> recording.WorkSeries:
     """Work and losses of the joints."""
-    time, energy, peak = _table(topic, layouts.work_rows(names))
+    time, energy, peak = table_of(topic, layouts.work_rows(names))
     count = len(names)
     return recording.WorkSeries(time, energy[:, :count], peak[:, :count], energy[:, count:])
 
 
-def _table(topic: Topic, names: Sequence[str]) -> list[Array]:
+def table_of(topic: Topic, names: Sequence[str]) -> list[Array]:
     """Increasing stamps (n,) [s], and the fields of the topic (n, k).
 
     The columns are the k names; others in the messages are ignored. Messages of several publishers
@@ -188,7 +188,7 @@ def _table(topic: Topic, names: Sequence[str]) -> list[Array]:
 
 
 def _joints(topic: Topic, names: Sequence[str]) -> recording.JointSeries:
-    time, *values = _table(topic, names)
+    time, *values = table_of(topic, names)
     unread = np.broadcast_to(np.nan, (len(time), len(names)))
     return recording.JointSeries(
         time, **{**dict.fromkeys(ALL_FIELDS, unread), **dict(zip(topic.fields, values,
@@ -198,7 +198,7 @@ def _joints(topic: Topic, names: Sequence[str]) -> recording.JointSeries:
 def _canonical(topic: Topic) -> recording.CanonicalSeries:
     frames = {stamp: frame for (names, frame), blocks in topic.blocks.items() if frame
               for block in blocks.all() for stamp in (block.stamp / 1e9).tolist()}
-    time, x, *rates = _table(topic, layouts.OSCILLATOR_ROWS)
+    time, x, *rates = table_of(topic, layouts.OSCILLATOR_ROWS)
     shape = (-1, len(LEGS), 2)
     x_dot = rates[0] if rates else np.broadcast_to(np.nan, x.shape)
     return recording.CanonicalSeries(time, x.reshape(shape), x_dot.reshape(shape),
@@ -212,7 +212,7 @@ def _gaits(topic: Topic, time: Array, frames: Mapping[float, str]) -> tuple[Gait
     if not rows:
         known = all(frames.get(of) for of in time.tolist())
         return tuple(_former_gait(frames[of]) for of in time.tolist()) if known else ()
-    changed, *numbers = _table(topic, [*rows, layouts.CADENCE_ROW])
+    changed, *numbers = table_of(topic, [*rows, layouts.CADENCE_ROW])
     gaits = [layouts.read_gait_rows(rows, *of)
              for of in zip(*(part.tolist() for part in numbers), strict=True)]
     return tuple(gaits[row] for row in
@@ -235,9 +235,9 @@ def _former_gait(text: str) -> GaitShares:
 
 
 def _feet(topic: Topic) -> recording.FootForceSeries:
-    time, force = _table(topic, LEGS)
+    time, force = table_of(topic, LEGS)
     if not time.size:
-        time, force = _table(topic, [f'{leg}_foot' for leg in LEGS])
+        time, force = table_of(topic, [f'{leg}_foot' for leg in LEGS])
     return recording.FootForceSeries(time, force)
 
 
@@ -272,7 +272,7 @@ def _changes(statuses: Statuses, what: Callable[[StatusEvent], Any],
 
 def _modes(topics: Mapping[str, Topic]) -> tuple[StatusEvent, ...]:
     """When which mode of the body began."""
-    time, position = _table(topics['posture_feedback'], layouts.MODE_ROWS)
+    time, position = table_of(topics['posture_feedback'], layouts.MODE_ROWS)
     if not time.size:  # a recording from before modes were states
         return _changes(topics['body_mode'].statuses, lambda event: event.message)
     modes = position.argmax(axis=1)

@@ -192,7 +192,7 @@ class Topic:
             key, values = self._numbers(kind, group)
             parts[key].append((group.rows, _stamps(group), values))
             taken += len(group.rows)
-        for key, of in parts.items():
+        for key, of in sorted(parts.items(), key=_first_row):
             rows, stamp, values = (np.concatenate(part) for part in zip(*of, strict=True))
             order = np.argsort(rows)
             block = _cut(Block(bag_ns[rows], stamp, values), order)
@@ -223,6 +223,11 @@ class Topic:
             if len(getattr(group.first, field)) == len(names):  # a message may leave a field out
                 values[:, k] = group.numbers(field)[:, kept]
         return (tuple(names[k] for k in kept), group.first.header.frame_id), values
+
+
+def _first_row(part: tuple[Any, list[tuple[Any, ...]]]) -> int:
+    """Which message was the first of a key, so that keys keep the order in which they came."""
+    return min(int(rows[0]) for rows, _, _ in part[1])
 
 
 def _changes_of(block: Block) -> Block:

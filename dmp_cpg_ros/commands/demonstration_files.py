@@ -8,10 +8,9 @@ import csv
 import io
 import math
 import zipfile
-from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
-from itertools import zip_longest
+from itertools import islice
 from pathlib import Path
 from typing import IO, Any
 
@@ -20,6 +19,8 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis import bag
+from dmp_cpg_ros.analysis.loading import table_of
+from dmp_cpg_ros.analysis.topics import AT_ONCE, Block, Topic
 from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, MissingFileError
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
@@ -187,29 +188,40 @@ def _bytes(file: IO[bytes], most: int) -> bytes:
 
 def _from_bag(path: Path, topic: str, joints: Sequence[str]) -> Demonstration:
     """Positions by joint name at every stamp at which all wanted joints are known."""
-    samples: dict[int, dict[str, tuple[float, float | None]]] = {}
+    wanted = Topic('', ('position', 'velocity'))
     with bag.opened(bag.find_bag(path)) as reader:
         kinds = {c.topic: c.msgtype for c in reader.connections}
         full = next((t for t in kinds if t == topic or t.endswith('/' + topic.lstrip('/'))), None)
         usable = sorted(t for t, kind in kinds.items() if kind == _JOINT_STATE)
-        if full not in usable:
+        if full is None or full not in usable:
             raise DataError(f"'{path}' has no topic '{topic}' of joint states; valid are "
                             f'{", ".join(usable) or "none in this bag"}')
         chosen = [c for c in reader.connections if c.topic == full]
-        for _, bag_ns, message in bag.decoded(reader, chosen, Counter()):
-            stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-            samples.setdefault(stamp or bag_ns, {}).update(
-                (name, (position, speed)) for name, position, speed
-                in zip_longest(message.name, message.position, message.velocity)
-                if name is not None and position is not None)
-    known = dict.fromkeys(name for row in samples.values() for name in row)
+        messages = bag.recorded(reader, chosen)
+        while some := list(islice(messages, AT_ONCE)):
+            _, times, raws = zip(*some, strict=True)
+            wanted.take(full, _JOINT_STATE, times, raws)
+    bag.warn_of(wanted.skipped)
+    known = dict.fromkeys(name for names, _ in wanted.blocks for name in names)
     names = tuple(joints or known)
     _check_joints(path, names, known)
-    stamps = sorted(stamp for stamp, row in samples.items() if row.keys() >= set(names))
-    if not stamps:
+    _begin_at_zero([block for blocks in wanted.blocks.values() for block in blocks.all()])
+    time, positions, velocities = table_of(wanted, names)
+    rows = ~np.isnan(positions).any(axis=1)
+    if not names or not rows.any():
         raise DataError(f"'{path}': no message on '{full}' holds all of {', '.join(names)}")
-    rows = [[samples[stamp][name] for name in names] for stamp in stamps]
-    complete = all(speed is not None for row in rows for _, speed in row)
-    values = np.array(rows, dtype=float)  # (m, n, 2)
-    times = np.array([stamp - stamps[0] for stamp in stamps]) * 1e-9
-    return Demonstration(times, values[..., 0], values[..., 1] if complete else None, None, names)
+    time, positions, velocities = time[rows], positions[rows], velocities[rows]
+    complete = not np.isnan(velocities).any()
+    return Demonstration(
+        time - time[0], positions, velocities if complete else None, None, names)
+
+
+def _begin_at_zero(blocks: Sequence[Block]) -> None:
+    """Let stamps, or record times where there are none, begin at zero: as seconds since 1970 they
+    would be rounded.
+    """
+    for block in blocks:
+        np.copyto(block.stamp, block.bag_ns, where=block.stamp == 0)
+    first = min((block.stamp.min() for block in blocks), default=0)
+    for block in blocks:
+        block.stamp[:] -= first

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from demonstrations import joint_angles, walking_joints
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration
 from dmp_cpg_ros.commands.learn import main
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
+from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
 from dmp_cpg_ros.primitive_files import load_primitive
@@ -100,6 +102,21 @@ def test_joints_that_come_in_separate_messages_are_put_together(tmp_path):
     assert read.names == WALK.names
     assert read.velocities is None
     np.testing.assert_array_equal(read.positions, WALK.positions)
+
+
+def test_a_long_recording_takes_hardly_more_memory_than_its_numbers(tmp_path):
+    count, joints = 6000, 12
+    times = 0.004 * np.arange(count)
+    positions = np.sin(times[:, None] + np.arange(joints))
+    walk = Demonstration(times, positions, positions, names=tuple(f'j{k}' for k in range(joints)))
+    bag = write_bag(tmp_path / 'bag', walk)
+    tracemalloc.start()
+    read = read_demonstration(bag)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    np.testing.assert_array_equal(read.positions, positions[:, ::-1])
+    numbers = 2 * 8 * joints * count
+    assert peak < 6 * numbers
 
 
 def test_messages_without_a_stamp_take_the_time_of_recording(tmp_path):
