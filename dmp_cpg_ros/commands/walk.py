@@ -235,7 +235,7 @@ def _analyze(plan: _Plan, folder: Path) -> int:
             report=not plan.options.no_report, scenario=plan.scenario.name,
             **plan.failures(),
             processes=plan.options.processes)
-    except DmpCpgError as error:
+    except (DmpCpgError, OSError) as error:  # such as a full disk
         print(f'walk: cannot analyze the recording: {error}', file=sys.stderr)
         return FAILED
     print_facts(results, lock_step)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import pty
@@ -13,6 +14,7 @@ import subprocess
 import sys
 import termios
 from pathlib import Path
+from typing import Any, NoReturn
 
 import pytest
 
@@ -24,6 +26,9 @@ from ros_processes import RUN_S, SHARED_HZ, NodeProcess, Processes, Ros, wait_un
 
 from dmp_cpg_ros.analysis.bag import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
+from dmp_cpg_ros.commands import analyze
+from dmp_cpg_ros.commands import walk as walk_command
+from dmp_cpg_ros.commands.ros_arguments import RosArguments
 from dmp_cpg_ros.commands.suite_domain import alone_in_domain
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError, claim
@@ -320,3 +325,22 @@ def test_help_of_walk_lists_the_scenarios(processes: Processes) -> None:
     process = processes.python('-m', 'dmp_cpg_ros', 'walk', '--help')
     assert process.wait() == 0
     assert 'start_stop' in process.output and 'votes' in process.output
+
+
+def test_a_full_disk_during_the_report_ends_in_a_line_and_what_is_said_at_the_end(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    def run(plan: Any, folder: Path, server: Any) -> tuple[int, list[str]]:
+        (folder / 'bag').mkdir()
+        return walk_command.OK, ['an event was refused']
+
+    def full(*_: Any, **__: Any) -> NoReturn:
+        raise OSError(errno.ENOSPC, 'No space left on device')
+
+    monkeypatch.setattr(walk_command, '_run', run)
+    monkeypatch.setattr(analyze, 'analyze_run', full)
+    options = walk_command._parser().parse_args(['--out', str(tmp_path / 'run')])
+    plan = walk_command._planned(options, RosArguments())
+    assert walk_command._walk(plan, None) == walk_command.FAILED
+    told = capsys.readouterr().err
+    assert 'No space left on device' in told and 'walk: an event was refused' in told
