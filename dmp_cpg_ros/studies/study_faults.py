@@ -19,11 +19,12 @@ import random
 import re
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from itertools import cycle, islice
 from math import inf, nan
@@ -39,7 +40,7 @@ from dmp_cpg_ros.core.canonical.phase import scalar_phase
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.studies.link_watch import FALLEN_TILT, posture
 from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
-from dmp_cpg_ros.studies.walk_process import WalkProcess, ahead
+from dmp_cpg_ros.studies.walk_process import WITHIN_S, WalkProcess, ahead
 from dmp_cpg_ros.suite import load_gaits
 from dmp_cpg_ros.suite_table import RECORDER, ROBOT, WALKING_NODES
 
@@ -148,8 +149,10 @@ def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence
             break
     if respawn:
         time.sleep(rng.uniform(4.0, 6.0))
-        walk.process.send_signal(signal.SIGINT)
-    outcome.status = walk.process.wait()
+    elif outcome.kills:  # by which it ends
+        with suppress(subprocess.TimeoutExpired):
+            walk.process.wait(WITHIN_S)
+    outcome.status = walk.end()
     (folder / 'said.txt').write_text(''.join(walk.lines))
     _judge(outcome, speed, folder / 'run')
     return outcome
