@@ -81,7 +81,8 @@ def measure(walk: WalkProcess, every_s: float) -> dict[str, list[float]]:
         try:
             found = {name: private_mb(pid) for name, pid in pids.items()}
         except OSError:  # one has ended, and so will the walk
-            walk.process.wait(PATIENCE_S)
+            with suppress(subprocess.TimeoutExpired):
+                walk.process.wait(PATIENCE_S)
             break
         for name, memory_mb in found.items():
             read[name].append(memory_mb)
@@ -124,6 +125,8 @@ def _main(options: argparse.Namespace, _: RosArguments) -> int:
 def table(read: dict[str, list[float]], hours: float) -> str:
     """Memory at the first reading, in the middle and at the last, and its growth, by process."""
     def row(name: str, memory: Sequence[float]) -> tuple[str, ...]:
+        if not memory:  # it ended before the first
+            return name, *'----'
         return (name, *(f'{memory[k]:.1f}' for k in (0, len(memory) // 2, -1)),
                 f'{growth(memory, hours):+.2f}')
 
