@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
@@ -69,6 +69,17 @@ def children(pid: int) -> list[int]:
             for child in map(int, task.read_text().split()):
                 found += [child, *children(child)]
     return found
+
+
+def pid_of(walk: int, nodes: Sequence[str]) -> int:
+    """Process of some nodes of a walk that is the process ``walk``; 0 when there is none."""
+    wanted = [{node.encode(), f'__node:={node}'.encode()} for node in nodes]
+    for path in Path('/proc').glob('[0-9]*/cmdline'):
+        with suppress(OSError):
+            words = set(path.read_bytes().split(b'\0'))
+            if str(walk).encode() in words and all(words & names for names in wanted):
+                return int(path.parent.name)
+    return 0
 
 
 def between(first: Usage, last: Usage) -> Usage:

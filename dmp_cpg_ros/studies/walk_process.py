@@ -21,6 +21,7 @@ from typing import Any
 from dmp_cpg_ros.commands.fork_server import end_with_parent
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.inhibition.supervisor import STATES
+from dmp_cpg_ros.studies.process_usage import pid_of
 
 WITHIN_S = 120.0
 """How long the suite may take to be ready, at first and again, before a walk is given up [s]."""
@@ -110,15 +111,7 @@ class WalkProcess:
 
     def pid_of(self, nodes: Sequence[str]) -> int:
         """Process of some nodes; 0 when there is none."""
-        wanted = {f'__node:={nodes[0]}'} if len(nodes) == 1 else set(nodes)
-        for path in Path('/proc').glob('[0-9]*/cmdline'):
-            try:
-                words = path.read_text().split('\0')
-            except OSError:
-                continue
-            if str(self.process.pid) in words and wanted.issubset(words):
-                return int(path.parent.name)
-        return 0
+        return pid_of(self.process.pid, nodes)
 
     def end(self) -> int:
         """Interrupt it, skip its report, and wait, or kill it when it hangs; returns the exit

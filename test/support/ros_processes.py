@@ -41,6 +41,7 @@ from dmp_cpg_ros.commands.fork_server import Forked
 from dmp_cpg_ros.commands.fork_server import __file__ as fork_server_file
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
+from dmp_cpg_ros.studies.process_usage import pid_of
 
 TESTS, PACKAGES = (str(Path(file).resolve().parents[1]) for file in (__file__, package))
 """Where processes run, and where they find the package: the same that the tests import."""
@@ -105,12 +106,7 @@ class NodeProcess:
 
     def pid_of(self, node: str) -> int:
         """Process of a node of this walk, which it may share with others."""
-        for path in Path('/proc').glob('[0-9]*/cmdline'):
-            with contextlib.suppress(OSError):
-                words = path.read_text(encoding='utf-8').split('\0')
-                if str(self.pid) in words and {node, f'__node:={node}'} & set(words):
-                    return int(path.parent.name)
-        pytest.fail(f'{node} does not run:\n{self.output}')
+        return pid_of(self.pid, [node]) or pytest.fail(f'{node} does not run:\n{self.output}')
 
     @property
     def running(self) -> bool:
