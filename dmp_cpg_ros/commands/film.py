@@ -22,7 +22,7 @@ from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import held, smoothed, velocity_in_heading
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.strict_json import read_json
-from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, positive, run_command
 from dmp_cpg_ros.commands.run_folder import run_context
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.robot.camera import Camera
@@ -215,7 +215,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help='FILE.gif, or FILE.mp4 when imageio-ffmpeg is installed')
     add('--start', metavar='S', type=float, default=Shot.start, help="begin, on the robot's clock")
     add('--end', metavar='S', type=float, default=Shot.end, help='end')
-    add('--fps', metavar='HZ', type=float, default=Shot.fps,
+    add('--fps', metavar='HZ', type=positive, default=Shot.fps,
         help='frames per second (default: %(default)g)')
     add('--width', metavar='PIXELS', type=int, default=Shot.width,
         help='width, of 16:9 (default: %(default)s)')

@@ -105,3 +105,11 @@ def test_an_empty_recording_or_time_has_no_film(glide, tmp_path):
 def test_a_missing_run_is_named(tmp_path, capsys):
     assert main([str(tmp_path / 'no_run'), str(tmp_path / 'film.gif')]) == 2
     assert 'no_run' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('fps', ['0', 'nan', '-1'])
+def test_frames_per_second_are_positive(tmp_path, capsys, fps):
+    with pytest.raises(SystemExit) as ended:
+        main([str(tmp_path), str(tmp_path / 'film.gif'), '--fps', fps])
+    assert ended.value.code == 2
+    assert f'argument --fps: {fps} must be' in capsys.readouterr().err
