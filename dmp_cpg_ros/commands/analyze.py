@@ -31,7 +31,7 @@ from dmp_cpg_ros.analysis.tables import (
     write_parquet,
 )
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.commands.run_folder import picture_taker, run_context
+from dmp_cpg_ros.commands.run_folder import picture_taker, run_context, run_of
 from dmp_cpg_ros.core.errors import ParameterError
 
 BAG_ALONE = {'note': 'made from a bag alone: versions, commit and host are those of the analysis'}
@@ -84,7 +84,7 @@ def analyze_run(
         used.
     """
     bag = find_bag(run_dir)
-    run = _run_of(bag, Path(run_dir))
+    run = run_of(bag, Path(run_dir))
     earlier = {} if run is None or parameters is not None else read_json(run / 'manifest.json')
     if certificate is None and run is not None:
         certificate = read_json(run / 'metrics.json').get('certificate')
@@ -214,15 +214,6 @@ def print_facts(results: RunResults, lock_step: bool | None) -> None:
     marks = {True: '[ok]', False: '[NO]', None: '[--]'}
     for fact in facts(results.metrics, lock_step):
         print(f'{marks[fact.holds]} {fact.statement}: {fact.finding}')
-
-
-def _run_of(bag: Path, given: Path) -> Path | None:
-    """Run's folder around a bag; None for a bare bag."""
-    if bag == given / 'bag':
-        return given
-    folder = bag.resolve() if bag.is_dir() else bag.resolve().parent
-    is_run = folder.name == 'bag' and (folder.parent / 'manifest.json').is_file()
-    return folder.parent if is_run else None
 
 
 if __name__ == '__main__':

@@ -105,6 +105,15 @@ def write_parameters(folder: Path, resolved: Mapping[str, Mapping[str, Any]]) ->
     return path
 
 
+def run_of(bag: Path, given: Path) -> Path | None:
+    """Run's folder around a bag; None for a bare bag."""
+    if bag == given / 'bag':
+        return given
+    folder = bag.resolve() if bag.is_dir() else bag.resolve().parent
+    is_run = folder.name == 'bag' and (folder.parent / 'manifest.json').is_file()
+    return folder.parent if is_run else None
+
+
 def run_context(parameters: Mapping[str, Any] | None, robot_file: Path | str | None = None
                 ) -> tuple[RunContext, Path | None]:
     """Find out what walked.

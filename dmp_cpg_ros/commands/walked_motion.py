@@ -16,7 +16,7 @@ from dmp_cpg_ros.analysis.context import find_parameter
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.strict_json import read_json
-from dmp_cpg_ros.commands.run_folder import run_context
+from dmp_cpg_ros.commands.run_folder import run_context, run_of
 from dmp_cpg_ros.core.canonical.phase import phase, phase_rate
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
@@ -68,12 +68,12 @@ def read_motion(path: Path, topic: str = 'joint_targets', robot_file: Path | Non
     """
     if topic not in ('joint_targets', 'joint_states'):
         raise DataError(f"a motion is learned from joint_targets or joint_states, not '{topic}'")
-    recording, file = load_recording(path), bag.find_bag(path)
-    run = (file if file.is_dir() else file.parent).parent
+    recording, run = load_recording(path), run_of(bag.find_bag(path), path)
     joints = recording.targets if topic == 'joint_targets' else recording.joints
     canonical = recording.canonical
     walked = next((gait.before for gait in canonical.gaits if not gait.after), 'amble')
-    parameters = read_json(run / 'manifest.json').get('parameters') or {'gait': walked}
+    known = {} if run is None else read_json(run / 'manifest.json')
+    parameters = known.get('parameters') or {'gait': walked}
     context, _ = run_context(parameters, robot_file)
     rows, at, attitude = motion.common_rows(joints.time, canonical.time, recording.odometry.time)
     if not len(rows):

@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 from demonstrations import joint_angles, walking_joints
 
+from dmp_cpg_ros.commands import walked_motion
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration
 from dmp_cpg_ros.commands.learn import main
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
+from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
@@ -290,6 +292,21 @@ def test_a_motion_needs_the_recording_of_a_walk(tmp_path, capsys):
     assert main([str(table)]) == BAD_INPUT
     assert '--out FILE or --motion FILE' in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_a_bare_bag_has_nothing_to_do_with_a_manifest_beside_it(tmp_path, monkeypatch):
+    asked = []
+
+    def context(parameters, robot_file):
+        asked.append(parameters)
+        raise DataError('no robot')
+
+    monkeypatch.setattr(walked_motion, 'run_context', context)
+    (tmp_path / 'manifest.json').write_text('{"parameters": {"gait": "pace"}}')
+    for name in ('outing', 'bag'):
+        with pytest.raises(DataError, match='no robot'):
+            walked_motion.read_motion(write_bag(tmp_path / name, WALK))
+    assert asked == [{'gait': 'amble'}, {'gait': 'pace'}]
 
 
 def test_help_answers_without_ros():
