@@ -11,7 +11,9 @@ from the one table `EXECUTABLES`.
 
 from __future__ import annotations
 
+import atexit
 import re
+import shutil
 import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
@@ -62,6 +64,7 @@ def wrappers() -> list[str]:
     if 'bdist_wheel' not in sys.argv:
         return []
     folder = Path(tempfile.mkdtemp(prefix=NAME))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     for executable in EXECUTABLES:
         path = folder / executable
         path.write_text(WRAPPER.format(executable=executable), encoding='utf-8')

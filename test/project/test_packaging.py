@@ -303,9 +303,11 @@ def checkout(tmp_path: Path) -> Path:
 
 
 def test_a_wheel_has_the_same_files_from_the_checkout_as_from_an_sdist(
-        checkout: Path, tmp_path: Path) -> None:
+        checkout: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip('setuptools', minversion='70.1')  # those before need the package wheel
-    unpacked = tmp_path / 'unpacked'
+    unpacked, scratch = tmp_path / 'unpacked', tmp_path / 'scratch'
+    scratch.mkdir()
+    monkeypatch.setenv('TMPDIR', str(scratch))
     with tarfile.open(built(checkout, 'sdist')) as archive:
         archive.extractall(unpacked, filter='data')
     (sources,) = unpacked.iterdir()
@@ -315,6 +317,7 @@ def test_a_wheel_has_the_same_files_from_the_checkout_as_from_an_sdist(
             contents.append({entry.filename: entry.CRC for entry in wheel.infolist()
                              if not entry.filename.endswith('/RECORD')})
     assert contents[0] == contents[1]
+    assert list(scratch.iterdir()) == []
     names = {name.partition('.data/data/')[2] or name for name in contents[0]}
     shared = {f'share/{PACKAGE}/{path.relative_to(ROOT)}' for folder in ('config', 'launch')
               for path in (ROOT / folder).rglob('*')
