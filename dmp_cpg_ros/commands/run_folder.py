@@ -11,13 +11,14 @@ import dataclasses
 import datetime
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from dmp_cpg_ros.analysis.context import RunContext, find_parameter
-from dmp_cpg_ros.configuration import ROBOTS, find_config, first_free, load_yaml
+from dmp_cpg_ros.configuration import ROBOTS, find_config, load_yaml, numbered
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
@@ -56,12 +57,14 @@ def make_run_folder(out: Path | None) -> Path:
             return out.resolve()
         runs = Path('runs')
         runs.mkdir(exist_ok=True)
-        folder = first_free(runs / datetime.datetime.now().strftime('%Y-%m-%d_%H-%M-%S'))
-        folder.mkdir()
-        latest = runs / 'latest'
+        for folder in numbered(runs / datetime.datetime.now().strftime('%Y-%m-%d_%H-%M-%S')):
+            with suppress(FileExistsError):  # perhaps of another walk that starts now
+                folder.mkdir()
+                break
+        latest, link = runs / 'latest', runs / f'.latest_{folder.name}'
         if latest.is_symlink() or not latest.exists():
-            latest.unlink(missing_ok=True)
-            latest.symlink_to(folder.name, target_is_directory=True)
+            link.symlink_to(folder.name, target_is_directory=True)
+            link.replace(latest)
         return folder.resolve()
     except OSError as error:
         raise DataError(f'cannot make the folder of the run: {error}') from error
