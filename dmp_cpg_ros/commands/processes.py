@@ -32,12 +32,14 @@ class ProcessGroup:
         self._logs, self._server = logs, server
         self._processes: dict[str, Forked] = {}
         self._commands: dict[str, Sequence[str]] = {}
+        self._ends: dict[str, str] = {}
 
     def start(self, name: str, command: Sequence[str], *, logged: bool = True) -> None:
         """Run an executable of this package with arguments, as :meth:`.ForkServer.start`. What is
         not logged is written where this process writes.
         """
         self._commands[name] = command
+        self._ends.pop(name, None)
         with open(self._logs / f'{name}.log' if logged else os.devnull, 'ab') as log:
             files = (log.fileno(), log.fileno()) if logged else ()
             try:
@@ -57,16 +59,14 @@ class ProcessGroup:
         """Say by the name of every process that has ended how, with the last line of its
         output.
         """
-        found = {}
         for name, process in self._processes.items():
-            status = process.poll()
-            if status is not None:
+            if name not in self._ends and (status := process.poll()) is not None:
                 how = (f'was ended by signal {-status} ({signal.Signals(-status).name})'
                        if status < 0 else f'ended with status {status}')
                 log = (self._logs / f'{name}.log').read_text(encoding='utf-8', errors='replace')
                 last = log.strip().rpartition('\n')[2]
-                found[name] = f'{name} {how}{last and ": " + last}'
-        return found
+                self._ends[name] = f'{name} {how}{last and ": " + last}'
+        return dict(self._ends)
 
     def stop(self, patience_s: float) -> list[str]:
         """End all processes: interrupt, and after a time kill.

@@ -20,6 +20,7 @@ from ros_processes import Processes
 
 from dmp_cpg_ros.commands import fork_server
 from dmp_cpg_ros.commands.fork_server import Forked, ForkServer
+from dmp_cpg_ros.commands.processes import ProcessGroup
 
 processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 WAIT_S = ros_processes.DEADLINE_S
@@ -119,3 +120,14 @@ def test_a_server_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.Mon
         os.kill(stopped._server.pid, signal.SIGSTOP)
         with pytest.raises(TimeoutError, match='does not answer'):
             stopped.start(NODE)
+
+
+def test_the_end_of_a_process_is_read_from_its_log_once(
+        server: ForkServer, tmp_path: Path) -> None:
+    group = ProcessGroup(tmp_path, server)
+    group.start('node', ('leg_transformation', '--ros-args', '-p', 'leg:=nose'))
+    ros_processes.wait_until(group.ended, what=lambda: 'its end')
+    ends = group.ended()
+    assert ends['node'].startswith('node ended with status ') and 'nose' in ends['node']
+    (tmp_path / 'node.log').write_text('another end')
+    assert group.ended() == ends
