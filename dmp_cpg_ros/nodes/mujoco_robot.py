@@ -120,8 +120,7 @@ class MujocoRobotNode(DrivenRobot):
             self._timer = None
 
     def cleanup(self) -> None:
-        """Release the robot."""
-        self._robot.close()
+        """Close the window."""
         if self._viewer is not None:
             self._viewer.close()
 

@@ -86,9 +86,6 @@ class PerfectTrackingRobot:
         self._tick += 1
         return self._state(position, velocity, effort, acceleration_in_world)
 
-    def close(self) -> None:
-        """Nothing to release; here because a robot has it."""
-
     def _feet_in_base(self, joint_position: Array) -> tuple[Array, float, NDArray[np.bool_]]:
         """Return feet (4, 3), height of the base over the ground, and which feet stand (4,)."""
         feet = np.array([leg.foot_in_base(joint_position[3 * i:3 * i + 3])

@@ -48,9 +48,6 @@ class Robot(Protocol):
             If the robot cannot go on.
         """
 
-    def close(self) -> None:
-        """Release what the robot holds; it cannot be used afterwards."""
-
 
 def steps_per_tick(tick_ns: int, step_ns: int) -> int:
     """Return how many physics steps make one control tick.
