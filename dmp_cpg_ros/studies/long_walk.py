@@ -21,15 +21,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, positive, run_command
 from dmp_cpg_ros.studies.bench_runs import shared
-from dmp_cpg_ros.studies.output import (
-    at_least_one,
-    markdown_table,
-    parser_of,
-    positive,
-    write_results,
-)
+from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.process_usage import private_mb
 from dmp_cpg_ros.studies.walk_process import WalkProcess
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import argparse
 import os
-from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -24,14 +23,6 @@ def at_least_one(text: str) -> int:
     number = int(text)
     if number < 1:
         raise argparse.ArgumentTypeError(f'{number} must be at least 1')
-    return number
-
-
-def positive(text: str) -> float:
-    """Type of an option that is finite and greater than zero."""
-    number = float(text)
-    if not 0.0 < number < inf:
-        raise argparse.ArgumentTypeError(f'{text} must be finite and greater than 0')
     return number
 
 

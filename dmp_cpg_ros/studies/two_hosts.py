@@ -31,7 +31,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from dmp_cpg_ros.commands.fork_server import ForkServer
 from dmp_cpg_ros.commands.processes import ProcessGroup
-from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, positive, run_command
 from dmp_cpg_ros.commands.suite_run import ENDED_WITHIN_S
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DmpCpgError
@@ -46,7 +46,7 @@ from dmp_cpg_ros.nodes.framework.parameters import BEST_EFFORT, DELIVERIES
 from dmp_cpg_ros.studies.link_watch import FALLEN_TILT, LinkWatch
 from dmp_cpg_ros.studies.lossy_link import Conditions
 from dmp_cpg_ros.studies.network_hosts import TwoHosts
-from dmp_cpg_ros.studies.output import markdown_table, parser_of, positive, write_results
+from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
 from dmp_cpg_ros.suite import load_suite
 from dmp_cpg_ros.suite_table import COMPOSED, PROCESSES, ROBOT, instances
 
