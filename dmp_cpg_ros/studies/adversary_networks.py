@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, topology
+from dmp_cpg_ros.core.canonical.coupling import TOPOLOGIES, CouplingGraph, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
@@ -38,7 +38,7 @@ WEAKENED = ('synchronisation', 'contraction', 'capture', 'time_step', 'cycle_rad
 
 STARTS = 2
 """Sequences of events that each network is run through."""
-KINDS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring', 'sparse', 'directed', 'unbalanced')
+KINDS = (*TOPOLOGIES, 'sparse', 'directed', 'unbalanced')
 
 
 def certified(case: Case, entry: Case, system: CanonicalSystem, free: Synchronisation,

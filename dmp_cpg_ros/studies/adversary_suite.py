@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.core.canonical.coupling import TOPOLOGIES
 from dmp_cpg_ros.core.canonical.inhibition import AUTO
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.errors import DmpCpgError
@@ -126,7 +127,6 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: tuple[int, float, fl
     return expected
 
 
-_GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 _NUMBERS = {'coupling_gain': (8.0, 400.0), 'rho': (0.5, 20.0), 'inhibition_gain': (60.0, 4000.0),
             'region_radius': (0.03, 1.2), 'cadence_scale': (0.25, 4.0), 'alpha_r': (0.7, 20.0),
             'capture_speed': (0.02, 2.0), 'max_speed': (0.05, 4.0), 'braking': (0.2, 20.0),
@@ -144,7 +144,7 @@ def _change(rng: np.random.Generator, names: Sequence[str]) -> Case:
         count = 1 + rng.choice(4, p=(0.5, 0.3, 0.15, 0.05))
         return {name: tuple(rng.permutation(LEGS)[:count].tolist())}
     if name == 'coupling_graph':
-        return {name: str(rng.choice(_GRAPHS))}
+        return {name: str(rng.choice(TOPOLOGIES))}
     return {name: log_uniform(rng, *_NUMBERS[name])}
 
 

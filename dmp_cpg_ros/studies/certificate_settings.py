@@ -13,7 +13,13 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
-from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, Edges, graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.coupling import (
+    TOPOLOGIES,
+    CouplingGraph,
+    Edges,
+    graph_from_edges,
+    topology,
+)
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.certify import certify
@@ -32,7 +38,7 @@ from dmp_cpg_ros.studies.draws import log_uniform, random_edges
 from dmp_cpg_ros.studies.network_batch import Setting
 from dmp_cpg_ros.suite import load_gaits
 
-GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring', 'directed')
+GRAPHS = (*TOPOLOGIES, 'directed')
 GAITS = load_gaits()
 LARGEST_MISMATCH = 0.05
 TICK = 0.004

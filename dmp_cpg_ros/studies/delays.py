@@ -21,7 +21,12 @@ from itertools import product
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.coupling import (
+    TOPOLOGIES,
+    CouplingGraph,
+    graph_from_edges,
+    topology,
+)
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
@@ -47,8 +52,6 @@ COLUMNS = ('delay', 'networks', 'none certified', 'nothing fails', 'share of wha
            'median', 'most')
 
 _BETWEEN = 8  # ages from the last that works to the first that fails
-
-GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,7 @@ def measured(networks: int, seed: int, kinds: Sequence[str] = tuple(MARGINS)) ->
 def gait_captures() -> Iterator[tuple[str, Capture]]:
     """Four legs on every graph, at cadences from a slow walk to a fast trot."""
     for graph, omega, (k, room) in product(
-            GRAPHS, (9.0, 20.0), ((40.0, 1.2), (100.0, 1.2), (100.0, 2.0))):
+            TOPOLOGIES, (9.0, 20.0), ((40.0, 1.2), (100.0, 1.2), (100.0, 2.0))):
         legs = graph_from_edges(4, topology(graph, 4), k)
         found = capture_of(legs, 8.0, 1.0, omega, 0.3, room, (0,))
         if found is not None:

@@ -41,8 +41,7 @@ from dmp_cpg_ros.paper.entry_tube import entry_tube
 from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
 from dmp_cpg_ros.suite import load_gait
 
-COUPLING = {'all_to_all': 100.0, 'ring': 100.0, 'path': 200.0, 'star': 100.0,
-            'directed_ring': 100.0}
+COUPLING = {**dict.fromkeys(graphs.TOPOLOGIES, 100.0), 'path': 200.0}
 """Coupling gains of the graphs where they are not looked for [1/s]."""
 
 RHO, OMEGA, REGION = 8.0, 12.0, 0.3

@@ -154,8 +154,12 @@ def degrees(name: str, size: int) -> tuple[int, ...]:
     return tuple(sum(i == node for i, _ in edges) for node in range(size))
 
 
+TOPOLOGIES = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
+"""Names of graphs."""
+
+
 def topology(name: str, size: int) -> Edges:
-    """Edges of a named graph: ``all_to_all``, ``ring``, ``path``, ``star`` or ``directed_ring``.
+    """Edges of a graph of ``TOPOLOGIES``.
 
     The star's centre is node 0; the directed ring passes the state on from i to i + 1.
 

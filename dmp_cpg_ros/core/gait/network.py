@@ -19,7 +19,7 @@ from math import atan2, ceil, cos, pi, sin
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.coupling import degrees, graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.coupling import TOPOLOGIES, degrees, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf, Oscillators
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, state_at, turned
@@ -46,7 +46,7 @@ class CanonicalParameters(Parameters):
     coupling_gain: float = parameter(100.0, 'gain k of every coupling', 0.01, 1e4, unit='1/s')
     coupling_graph: str = parameter(
         'all_to_all', 'coupling graph of the legs',
-        choices=('all_to_all', 'ring', 'path', 'star', 'directed_ring'))
+        choices=TOPOLOGIES)
     cadence_scale: float = parameter(1.0, "factor on the gait's cadence at every speed", 0.25, 4.0)
     contact_feedback: bool = parameter(
         False, 'whether early and late touchdown shift the phase of the legs')
