@@ -10,6 +10,7 @@ from typing import Any
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.grounds import World
 
@@ -52,7 +53,7 @@ class RunContext:
         """Normal force above which a foot counts as being on the ground [N]."""
         if self.robot is None:
             return USUAL_CONTACT_FORCE
-        return CONTACT_WEIGHT_SHARE * self.robot.mass * 9.81
+        return CONTACT_WEIGHT_SHARE * self.robot.mass * GRAVITY
 
 
 def find_parameter(parameters: Mapping[str, Any] | None, name: str, default: Any = None) -> Any:

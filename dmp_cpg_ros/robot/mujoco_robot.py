@@ -14,6 +14,7 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.maths.vec3 import rotation
+from dmp_cpg_ros.core.modes.falls import FALLEN_HEIGHT_SHARE, FALLEN_TILT
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.grounds import World
 from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
@@ -76,8 +77,6 @@ class SensorNoise:
             gyro_in_base=state.measured_rate_in_base + noise[:3])
 
 
-FALLEN_HEIGHT_SHARE = 0.5  # of the stance height
-FALLEN_TILT = np.deg2rad(60.0)
 LYING_HEIGHT_SHARE = 0.7  # on rough ground a belly that brushes an edge above this has not fallen
 LYING_TILT = np.deg2rad(40.0)
 INITIAL_PENETRATION = 1e-5  # [m] without any there would be no contact at the first stamp
@@ -332,9 +331,6 @@ class MujocoRobot:
             return float(place[2])
         hips = place + self._hips_in_base @ _rotation(quaternion).T
         return float(height_over_ground(self.world, place, hips))
-
-    def close(self) -> None:
-        """Nothing to release; here because a robot has it."""
 
     def _state(self) -> RobotState:
         qvel, d, pose = self.data.qvel, self._ids.base_dof, self._base_pose

@@ -12,13 +12,9 @@ import numpy as np
 from dmp_cpg_ros.analysis import episodes, motion
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.recording import Array, Recording
+from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.modes.falls import FALLEN_HEIGHT_SHARE, FALLEN_TILT
 from dmp_cpg_ros.suite_table import POSTURE
-
-FALLEN_HEIGHT_SHARE = 0.5
-"""Share of the standing height below which the robot has fallen."""
-
-FALLEN_TILT = np.deg2rad(60.0)
-"""Tilt of the base beyond which the robot has fallen [rad]."""
 
 SWAY_WINDOW = 1.0
 """The path is averaged over whole gait cycles of at least this time: sway is no distance [s]."""
@@ -128,7 +124,7 @@ def cost_of_transport(recording: Recording, context: RunContext, distance: float
     else:
         power = np.maximum(joints.effort * joints.velocity, 0.0).sum(axis=1)
         work, source = motion.integral(joints.time, power)[-1], 'joint_states'
-    return float(work / (context.robot.mass * 9.81 * distance)), source
+    return float(work / (context.robot.mass * GRAVITY * distance)), source
 
 
 def cost_without_losses(recording: Recording, context: RunContext, distance: float | None,
@@ -141,7 +137,7 @@ def cost_without_losses(recording: Recording, context: RunContext, distance: flo
         return None
     loss = (told.loss[-1] - told.loss[0]).sum()
     cost, _ = cost_of_transport(recording, context, distance)
-    without = (cost or 0.0) - loss / (context.robot.mass * 9.81 * distance)
+    without = (cost or 0.0) - loss / (context.robot.mass * GRAVITY * distance)
     return float(without) if np.isfinite(without) else None
 
 

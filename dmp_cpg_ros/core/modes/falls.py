@@ -21,6 +21,11 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
+FALLEN_HEIGHT_SHARE, FALLEN_TILT = 0.5, np.deg2rad(60.0)
+"""Share of the standing height below which, and tilt [rad] beyond which, whoever looks on from
+outside says that the robot has fallen; the suite itself goes by its parameters.
+"""
+
 CERTAIN_SUPPORT = 0.5
 """Share of the weight on the contact sensors from which the joint torques need not be asked."""
 
