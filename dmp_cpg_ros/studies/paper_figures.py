@@ -55,7 +55,6 @@ WIDTHS = (3.4, 2.4, 1.5, 0.8)
 SHOWN = 25.0
 """Time from the start that figure vdp shows [s]."""
 
-REGION: Any = {'facecolor': '#DCE8F5', 'edgecolor': '#3B6EA8'}
 CYCLE: Any = {'linestyle': (0, (4, 3)), 'color': '#777777'}
 
 
@@ -179,20 +178,21 @@ def local_dynamics_figure(free: LocalDynamics, inhibited: LocalDynamics) -> Figu
                          color='#C3C8CF', linewidth=0.6, arrowsize=0.6, density=1.3)
         if data.region_radius:
             panel.add_patch(Circle(
-                tuple(data.target), data.region_radius, linewidth=1.0, zorder=1.5, **REGION))
+                tuple(data.target), data.region_radius, linewidth=1.0, zorder=1.5, **style.REGION))
         panel.add_patch(Circle((0.0, 0.0), 1.0, fill=False, linewidth=0.9, zorder=2, **CYCLE))
         for trajectory in data.trajectories:
             panel.plot(*trajectory.T, color=style.MEASURED, linewidth=0.9, zorder=3)
             panel.plot(*trajectory[0], marker='o', markersize=2.5, color=style.MEASURED, zorder=3)
             if data.region_radius:
-                panel.plot(*trajectory[-1], marker='o', markersize=4.5, color='#D55E00', zorder=4)
+                panel.plot(*trajectory[-1], marker='o', markersize=4.5, color=style.VERMILION,
+                           zorder=4)
         panel.set(title=title, xlabel='$x_1$ [–]', xlim=(-1.6, 1.6), ylim=(-1.6, 1.6))
         panel.set_aspect('equal')
     axes[0, 0].set_ylabel('$x_2$ [–]')
     return style.legend(figure, [
         style.key('trajectories', color=style.MEASURED, marker='o', markersize=2.5),
-        style.key('free limit cycle', **CYCLE), Patch(label='region C', **REGION),
-        style.key('at rest', color='#D55E00', marker='o', linestyle='')])
+        style.key('free limit cycle', **CYCLE), Patch(label='region C', **style.REGION),
+        style.key('at rest', color=style.VERMILION, marker='o', linestyle='')])
 
 
 def gait_figure(gait: Gait, duty: float) -> Figure:
@@ -221,14 +221,14 @@ def hierarchy_figure() -> Figure:
     figure, [[panel]] = style.new_figure(1.7)
     _blank(panel, (0.0, 10.0), (0.0, 2.6))
     for y, kind, canonical, colour in (
-            (1.9, 'discrete', 'contracting', '#DCE8F5'),
-            (0.7, 'rhythmic', 'transverse contracting', '#F6E8B1')):
+            (1.9, 'discrete', 'contracting', style.REGION['facecolor']),
+            (0.7, 'rhythmic', 'transverse contracting', style.SHADES['stop requested'])):
         panel.text(0.1, y, kind, va='center', fontweight='bold')
-        _box(panel, (2.6, y), 'reference  r\ncontracting', '#DCE8F5')
+        _box(panel, (2.6, y), 'reference  r\ncontracting', style.REGION['facecolor'])
         _arrow(panel, (3.65, y), (4.25, y))
         _box(panel, (5.3, y), f'canonical  x\n{canonical}', colour)
         _arrow(panel, (6.35, y), (6.95, y))
-        _box(panel, (8.0, y), 'transformation  y\ncontracting', '#DCE8F5')
+        _box(panel, (8.0, y), 'transformation  y\ncontracting', style.REGION['facecolor'])
     return figure
 
 
@@ -259,7 +259,7 @@ def _blank(axes: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
 def _box(axes: Axes, centre: tuple[float, float], text: str, colour: str) -> None:
     x, y = centre
     axes.add_patch(FancyBboxPatch((x - 0.95, y - 0.4), 1.9, 0.8, boxstyle='round,pad=0.08',
-                                  facecolor=colour, edgecolor='#555555', linewidth=0.7))
+                                  facecolor=colour, edgecolor=style.FRAME, linewidth=0.7))
     axes.text(x, y, text, ha='center', va='center', fontsize=7.5)
 
 
@@ -270,7 +270,7 @@ def _node(axes: Axes, centre: tuple[float, float], text: str, colour: str) -> No
 
 
 def _arrow(axes: Axes, tail: tuple[float, float], head: tuple[float, float], kind: str = '-|>',
-           shrink: float = 0.0, colour: str = '#555555', bend: float = 0.0) -> None:
+           shrink: float = 0.0, colour: str = style.FRAME, bend: float = 0.0) -> None:
     axes.add_patch(FancyArrowPatch(tail, head, arrowstyle=kind, mutation_scale=8, shrinkA=shrink,
                                    shrinkB=shrink, color=colour, linewidth=0.9, zorder=2,
                                    connectionstyle=f'arc3,rad={bend}'))

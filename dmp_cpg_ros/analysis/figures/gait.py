@@ -31,7 +31,6 @@ AHEAD = 1.5
 """Time before the request that is drawn [s]."""
 
 FREE, REQUESTED = '#C9CED6', '#B8860B'
-REGION: Any = {'facecolor': '#E8EEF6', 'edgecolor': '#3B6EA8'}
 TARGET: Any = {'color': style.RED, 'marker': 'x', 'linestyle': ''}
 
 
@@ -103,7 +102,7 @@ def footfall(recording: Recording, context: RunContext) -> Figure | None:
     shades = style.shade_stops(axes[-1, 0], recording)
     axes[-1, 0].set_xlabel('time [s]')
     pale = [Patch(color='#BBBBBB', label='planned')] if context.gait is not None else []
-    return style.legend(figure, [Patch(color='#555555', label='measured'), *pale, *shades])
+    return style.legend(figure, [Patch(color=style.FRAME, label='measured'), *pale, *shades])
 
 
 def phase_portrait(recording: Recording, context: RunContext) -> Figure | None:
@@ -144,7 +143,7 @@ def phase_portrait(recording: Recording, context: RunContext) -> Figure | None:
     return style.legend(figure, [
         style.key('free', color=FREE, linewidth=3.2),
         *style.keys(('stop requested', 'inhibited'), (REQUESTED, style.INK)),
-        Patch(label='region C', **REGION), style.key('target $x_d$', **TARGET)])
+        Patch(label='region C', **style.REGION), style.key('target $x_d$', **TARGET)])
 
 
 def _places(recording: Recording, context: RunContext, time: float) -> Array:
@@ -162,7 +161,8 @@ def _inhibited(axes: Axes, recording: Recording, context: RunContext, stop: Epis
     """Draw the inhibited oscillator before, during and after its capture."""
     time, x = recording.canonical.time, recording.canonical.x[:, held]
     axes.add_patch(Circle(
-        tuple(target), context.inhibition.region_radius, linewidth=0.8, zorder=1.5, **REGION))
+        tuple(target), context.inhibition.region_radius, linewidth=0.8, zorder=1.5,
+        **style.REGION))
     for start, end, colour, width in (
             (stop.start - AHEAD, stop.start, FREE, 3.2),
             (stop.start, stop.captured, REQUESTED, 1.3),

@@ -29,7 +29,7 @@ FILTERED: Any = {'color': style.REFERENCE, 'linestyle': style.DASHED}
 ASKED_FOR: Any = {'color': style.INK, 'linestyle': style.DASHED}
 LIMIT: Any = {'color': style.GREY, 'linestyle': style.DASHED, 'linewidth': 0.9}
 COLOURS = (style.BLUE, style.ORANGE, style.VIOLET)
-MEDIAN, LATE = '#0072B2', '#D55E00'
+MEDIAN, LATE = style.DEEP_BLUE, style.VERMILION
 
 CYCLES = 3
 """Gait cycles of steady walking whose torques are drawn."""

@@ -44,14 +44,17 @@ DPI = 200
 LEGEND_HEIGHT = 0.28
 """Strip above the panels that a legend takes [inch]."""
 
-LEG_COLOURS = dict(zip(LEGS, ('#0072B2', '#D55E00', '#009E73', '#CC79A7'), strict=True))
+DEEP_BLUE, VERMILION = '#0072B2', '#D55E00'
+LEG_COLOURS = dict(zip(LEGS, (DEEP_BLUE, VERMILION, '#009E73', '#CC79A7'), strict=True))
 """Okabe & Ito's palette, which keeps its contrast with every kind of colour vision."""
 
 LEG_NAMES = dict(zip(LEGS, ('front left', 'front right', 'rear left', 'rear right'), strict=True))
 
-INK, GREY, MEASURED, REFERENCE = '#222222', '#8A8A8A', '#0072B2', '#222222'
+INK, GREY, FRAME, MEASURED = '#222222', '#8A8A8A', '#555555', DEEP_BLUE
+REFERENCE = INK
 SHADES = {'stop requested': '#F6E8B1', 'inhibited': '#D9DEE4'}
 BLUE, ORANGE, VIOLET, RED = '#56B4E9', '#E69F00', '#6A51A3', '#C00000'
+REGION: Any = {'facecolor': '#E8EEF6', 'edgecolor': '#3B6EA8'}
 DASHED = (0, (5, 2))
 
 _PARAMETERS: Any = {
@@ -59,7 +62,7 @@ _PARAMETERS: Any = {
     'axes.labelsize': 8.5, 'axes.titlesize': 8.5, 'legend.fontsize': 8.0, 'xtick.labelsize': 8.0,
     'ytick.labelsize': 8.0, 'axes.titlelocation': 'left', 'axes.titlepad': 4.0,
     'text.color': INK, 'axes.labelcolor': INK, 'xtick.labelcolor': INK, 'ytick.labelcolor': INK,
-    'xtick.color': '#555555', 'ytick.color': '#555555', 'axes.edgecolor': '#555555',
+    'xtick.color': FRAME, 'ytick.color': FRAME, 'axes.edgecolor': FRAME,
     'axes.linewidth': 0.7, 'axes.spines.top': False, 'axes.spines.right': False,
     'axes.grid': True, 'grid.color': '#E4E4E4', 'grid.linewidth': 0.6, 'axes.axisbelow': True,
     'lines.linewidth': 1.2, 'legend.frameon': False, 'agg.path.chunksize': 10_000,
