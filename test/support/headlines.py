@@ -152,6 +152,48 @@ def gaits(results: Any) -> str:
             f'{digits}·10{sign} rad')
 
 
+def rough(results: Any) -> str:
+    """Of ``benchmark_walking --tables rough``."""
+    shares = [share for of in crossings(results).values() for share in of]
+    seeds = {one['case']['seed'] for one in results['rough']}
+    span = f'{min(shares):.0f} to {max(shares):.0f} %'.replace('100 to 100', '100')
+    return (f'blind, {len(seeds)} seeds each: {span} cross blocks of 5 cm, slopes of 15°, steps '
+            'of 8 cm, and friction 0.3')
+
+
+def stairs(results: Any) -> str:
+    """Of ``benchmark_walking --tables climbing``."""
+    counts, of = climbed(results), len(results['climbing']) // 2
+    (off, off_fell, _), (on, on_fell, _) = (
+        map(sum, zip(*(counts[word, gait] for gait in ('amble', 'trot')), strict=True))
+        for word in ('off', 'on'))
+    return (f'five of 10 cm up and down, blind: {on} of {of} walks cross, {on_fell} fall; without '
+            f'what all legs share {off or "none"} and {off_fell}')
+
+
+def climbed(results: Any) -> dict[tuple[str, str], list[int]]:
+    """How many walks crossed, fell, and stopped as blocked, by ``climbing`` and gait."""
+    of: dict[tuple[str, str], list[int]] = {}
+    for one in results['climbing']:
+        case, outcome = one['case'], one['outcome']
+        counts = of.setdefault(('off' if case['values'] else 'on', case['gait']), [0, 0, 0])
+        for k, name in enumerate(('crossed', 'fell', 'blocked')):
+            counts[k] += outcome[name]
+    return of
+
+
+def crossings(results: Any) -> dict[str, list[float]]:
+    """Shares of the seeds that crossed each ground, by gait [%]."""
+    of: dict[str, dict[str, list[bool]]] = {}
+    for one in results['rough']:
+        case = one['case']
+        grounds = of.setdefault(case['gait'], {})
+        crossed = grounds.setdefault(f'{case["kind"]} {case["numbers"]}', [])
+        crossed.append(one['outcome']['crossed'])
+    return {gait: [100.0 * sum(crossed) / len(crossed) for crossed in grounds.values()]
+            for gait, grounds in of.items()}
+
+
 def tightness(rows: Any) -> str:
     """Of ``tightness``."""
     def span(*conditions: str, digits: int = 2) -> str:
@@ -226,6 +268,19 @@ def speed_rows(results: Any) -> list[str]:
     return rows
 
 
+def rough_rows(results: Any) -> list[str]:
+    """Rows of the table of rough ground: a gait, and its share on every ground."""
+    return [' | '.join((f'| {gait}', *(f'{share:.0f} %' for share in shares))) + ' |'
+            for gait, shares in crossings(results).items()]
+
+
+def stair_rows(results: Any) -> list[str]:
+    """Rows of the table of stairs: climbing, gait, and what became of the walks."""
+    each = len(results['climbing']) // 4
+    return [f'| {climbing} | {gait} | {crossed}/{each} | {fell} | {blocked} |'
+            for (climbing, gait), (crossed, fell, blocked) in climbed(results).items()]
+
+
 TIGHTNESS = {
     'synchronisation': 'synchronisation', 'capture': 'capture',
     'contraction under inhibition, along tubes': 'contraction along tubes',
@@ -288,6 +343,8 @@ class Study:
 STUDIES = {
     'the-experiment': Study(experiment, experiment_rows),
     'speeds': Study(speeds, speed_rows), 'changes-of-gait': Study(gaits, gait_rows),
+    'rough-ground': Study(rough, rough_rows),
+    'stairs-what-one-foot-felt-all-know': Study(stairs, stair_rows, 'doc/walking.md'),
     'tightness-of-the-certificates': Study(tightness, tightness_rows),
     'falls': Study(falls, fall_rows), 'stops-at-every-phase': Study(stops, stop_rows),
     'brisk-stops': Study(brisk_stops, brisk_rows, 'doc/walking.md')}
