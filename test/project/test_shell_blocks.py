@@ -9,7 +9,6 @@ import os
 import shlex
 import shutil
 import sys
-import time
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,7 +21,7 @@ pytest.importorskip('rclpy')
 
 from checkout import ROOT, needs_make, recipe, setup_constant
 from demonstrations import straight_reach
-from ros_processes import SHARED_HZ, NodeProcess, Processes, reserved_domain
+from ros_processes import SHARED_HZ, NodeProcess, Processes, reserved_domain, wait_until
 from test_readme import DOCUMENTS, TRANSCRIPTS, blocks, commands, transcript
 
 from dmp_cpg_ros import __file__ as package
@@ -36,9 +35,6 @@ pytestmark = pytest.mark.skipif(
 
 PATIENCE_S = 600.0
 """How long a loaded machine may take [s]."""
-
-AGAIN_S = 0.7
-"""Time from one Ctrl-C to the next [s]."""
 
 SHORT = ('--no-report',)
 """Option with which walks are typed, for they are ended as soon as they walk: that a walk leaves a
@@ -144,11 +140,11 @@ class Reader:
         for processes, statuses in ((self.beside, (0, 1, 130)), (self.suites, (130, -SIGINT))):
             for process in processes:
                 process.interrupt()
-            lying = [suite for suite in self.suites if '--lock-step' not in str(suite.command)]
-            if processes is self.suites and lying:
-                time.sleep(AGAIN_S)
-                for process in lying:
-                    process.interrupt()
+            if processes is self.suites:
+                for process in processes:
+                    wait_until(lambda of=process: not of.running or 'lie_down: ' in of.output)
+                    if process.running:
+                        process.interrupt()
             for process in processes:
                 assert process.wait(PATIENCE_S) in statuses, process
             processes.clear()
