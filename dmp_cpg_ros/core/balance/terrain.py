@@ -170,7 +170,8 @@ class Terrain(NamedTuple):
         mean = sum(heights) / len(heights)
         low, lower, higher, high = sorted(heights)
         rough = 0.0 if anew else self.rough * exp(-way / (FADES * leg_length))
-        found = calm and high - 0.5 * (lower + higher) > STEP * leg_length
+        middle = 0.5 * (lower + higher)
+        found = calm and high - middle > STEP * leg_length
         if found or (rough and high - low > UNEVEN * leg_length):
             rough = max(rough, high - low)
         for foot, share, touch in zip(feet, swung, touches, strict=True):
@@ -178,13 +179,11 @@ class Terrain(NamedTuple):
                 height = dot(normal, foot) - mean
                 if height > CLEAR_OF_GROUND * leg_length:
                     rough = max(rough, height + MARGIN * leg_length)
-        middle = 0.5 * (lower + higher)
-        hangs = in_turn and (calm or self.gaps) and any(
+        hangs = not anew and in_turn and (calm or self.gaps) and any(
             not (touch or 0.0 <= share <= 1.0)
             and middle - dot(normal, foot) > HOLLOW * leg_length
             for foot, share, touch in zip(feet, swung, touches, strict=True))
-        left = 0.0 if anew else max(0.0, self.gaps - way)
-        gaps = FADES * leg_length if hangs and not anew else left
+        gaps = FADES * leg_length if hangs else 0.0 if anew else max(0.0, self.gaps - way)
         rough = min(rough, HIGHEST * leg_length) if rough > FORGOTTEN * leg_length else 0.0
         return Terrain(rough, gaps, footholds, place), LEVEL_FEET if rough == 0.0 else tuple(
             height - mean - RAISED * rough - (

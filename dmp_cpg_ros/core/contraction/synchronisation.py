@@ -211,7 +211,9 @@ def overshoot(laplacian: Array) -> float:
 
 
 def invariant_radius(radius: float, overshot: float, rho: float) -> float:
-    """R of the disc |x| ≤ R that no oscillator leaves, from :func:`overshoot`."""
+    """R of the disc |x| ≤ R that no oscillator of a radius r leaves, from :func:`overshoot` and ρ
+    [1/s]: R² = r² + overshoot/ρ.
+    """
     return radius if overshot == 0.0 else float(np.sqrt(radius**2 + overshot / rho))
 
 

@@ -188,15 +188,14 @@ class GaitSupervisor:
                    ) -> SupervisorState:
         """Follow less of the command, and step faster, while the body is disturbed; follow at most
         a share of it while the gait changes. On rough ground feet need their time to be lifted
-        over it.
+        over it; over gaps the body does not slow down.
         """
         least = CLIMBING if progress.rough else STRIDING if progress.gaps else LEAST
         p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.wide)
         predicted = state.requested or state.state == 'releasing'
         share, most = 1.0, min(most, state.block.most)
         if not (predicted or state.push.acts):
-            share = followed_share(state.share, left if p.caution else None, dt, most,
-                                   least)
+            share = followed_share(state.share, left if p.caution else None, dt, most, least)
         free = p.step_timing and (state.push.acts or not predicted) and not progress.rough
         quickness = quickened(state.quickness, left if free else None, dt)
         same = (share, quickness) == (state.share, state.quickness)
