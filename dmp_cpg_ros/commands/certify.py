@@ -17,9 +17,9 @@ from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.core.certificates import inequality, proof, suggest, votes
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.inequality import Certificate
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.suite import Suite, load_suite
@@ -51,17 +51,15 @@ def _certify(options: argparse.Namespace, ros: RosArguments) -> int:
     if options.robot is not None:
         overrides['robot'] = str(find_config(options.robot, ROBOTS).resolve())
     suite = load_suite(file, overrides, ros.namespace)
-    p, running = suite.parameters, running_parameters(suite)
-    network = running['network']
-    span = operating_range(network, p.inhibition, p.reference)
-    needed = votes.votes_needed(network, p.inhibition, p.voting, span)
-    certificate = certify(**running, voting=p.voting)
-    suggestion = suggest.suggest_gains(**running, voting=p.voting) if options.suggest else None
+    p, running = suite.parameters, running_setting(suite)
+    needed = votes.votes_needed(running.network, p.inhibition, p.voting, running.span)
+    certificate = certify(running)
+    suggestion = suggest.suggest_gains(running) if options.suggest else None
     if options.proof is not None and certificate.holds:
         if p.voting.voting or p.canonical.contact_feedback:
             raise ParameterError('voting and contact_feedback have no exact proof; --proof needs '
                                  'both to be off')
-        write_json(options.proof, proof.proof_of(**running))
+        write_json(options.proof, proof.proof_of(running))
     if options.json:
         content = _mapping(suite, certificate, needed)
         if options.suggest:
@@ -76,16 +74,12 @@ def _certify(options: argparse.Namespace, ros: RosArguments) -> int:
     return HOLDS if certificate.holds else FAILS
 
 
-def running_parameters(suite: Suite) -> dict[str, Any]:
-    """Network, inhibition, reference, leg, posture and tick of a suite, as arguments of
-    :func:`~dmp_cpg_ros.core.certificates.certify.certify`.
-    """
+def running_setting(suite: Suite) -> Setting:
+    """What the certificate of a suite is computed from."""
     from dmp_cpg_ros.robot.model_reader import load_description
 
-    p = suite.parameters
-    network = GaitNetwork(p.canonical, suite.gait, body_scale(load_description(suite.robot_file)))
-    return {'network': network, 'inhibition': p.inhibition, 'reference': p.reference,
-            'leg': p.leg, 'posture': p.posture, 'tick_s': suite.tick_ns * 1e-9}
+    p, scale = suite.parameters, body_scale(load_description(suite.robot_file))
+    return Setting.of(GaitNetwork(p.canonical, suite.gait, scale), p, suite.tick_ns * 1e-9)
 
 
 def _report(suite: Suite, certificate: Certificate, needed: votes.VotesNeeded) -> list[str]:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dmp_cpg_ros.commands import ros_arguments, run_folder
-from dmp_cpg_ros.commands.certify import running_parameters
+from dmp_cpg_ros.commands.certify import running_setting
 from dmp_cpg_ros.configuration import (
     ROBOTS,
     SCENARIOS,
@@ -122,7 +122,7 @@ def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _P
                              'failures_allowed:=true')
     if 'votes' in events and not suite.parameters.voting.voting:
         raise ParameterError(f"scenario '{scenario.name}' votes, which needs voting:=true")
-    certificate = certify(**running_parameters(suite), voting=suite.parameters.voting)
+    certificate = certify(running_setting(suite))
     if not certificate.holds and not overrides.get('allow_uncertified', False):
         raise ParameterError(
             f'the gait is not certified to stop: {certificate.explained()} (certify --suggest '

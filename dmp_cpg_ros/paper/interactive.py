@@ -16,6 +16,7 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.inequality import finite
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
@@ -25,7 +26,6 @@ from dmp_cpg_ros.core.inhibition.prediction import look_ahead, ticks_ahead
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 from dmp_cpg_ros.core.reference.governor import Governor
-from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 
@@ -91,10 +91,10 @@ class Page:
             If a value is out of its range.
         """
         gait, p = self._parts(values)
-        network = GaitNetwork(p.canonical, gait, self.scale)
-        found = certify(network, p.inhibition, p.reference, p.leg, p.posture, self.tick_s)
+        running = Setting.of(GaitNetwork(p.canonical, gait, self.scale), p, self.tick_s)
+        found = certify(running)
         return {**found.as_mapping(), 'broken': [row.explained() for row in found.failing],
-                'omega': operating_range(network, p.inhibition, p.reference).omega}
+                'omega': running.span.omega}
 
     def episode(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Oscillators through a stop and a start, with what is predicted at each request.

@@ -16,8 +16,7 @@ from dmp_cpg_ros.core.certificates.network import NetworkAnalysis, Setting, anal
 from dmp_cpg_ros.core.certificates.step import SteppedNetwork, stepped_network
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.suite_parameters import SuiteParameters
-from dmp_cpg_ros.studies.certificate_settings import Arguments, random_arguments
+from dmp_cpg_ros.studies.certificate_settings import random_setting
 from dmp_cpg_ros.studies.draws import Case, Judged
 
 Complex = NDArray[np.complex128]
@@ -27,12 +26,9 @@ _STATES = 200
 _SHARE = (0.5, 0.9)  # of a distance after a step, for which it is taken where the row is left out
 
 
-def analysed(arguments: Arguments) -> Analysed:
+def analysed(s: Setting) -> Analysed:
     """What is proved of the step of a suite."""
-    network, inhibition, reference, leg, posture, tick = arguments
-    s = Setting.of(network, SuiteParameters(
-        reference=reference, inhibition=inhibition, leg=leg, posture=posture), tick)
-    analysis = analyse_network(network, inhibition, s.span)
+    analysis = analyse_network(s.network, s.parameters.inhibition, s.span)
     return s, analysis, stepped_network(s, analysis)
 
 
@@ -81,7 +77,7 @@ def draw(rng: np.random.Generator, weaken: bool) -> Case:
 def _drawn(case: Case) -> tuple[np.random.Generator, Setting, NetworkAnalysis,
                                 SteppedNetwork] | None:
     rng = np.random.default_rng(case['seed'])
-    s, analysis, found = analysed(random_arguments(rng))
+    s, analysis, found = analysed(random_setting(rng))
     return (rng, s, analysis, found) if found is not None and found.proved else None
 
 

@@ -15,6 +15,7 @@ import timeit
 from array import array
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from typing import NamedTuple
 
@@ -25,7 +26,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 
-from dmp_cpg_ros.commands.certify import running_parameters
+from dmp_cpg_ros.commands.certify import running_setting
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.coupling import Edges, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.phase import state_at
@@ -158,7 +159,6 @@ def certificates() -> list[Row]:
     """
     suite, run = _walking()
     loop, new = run.loop, count(1)
-    running, voting = running_parameters(suite), suite.parameters.voting
 
     other = _walking()[1].loop  # of which the gait is on its way to another
     more = _walking({'voting': True, 'auto_gait': True, 'inhibited_legs': ['auto']})[1].loop
@@ -175,8 +175,8 @@ def certificates() -> list[Row]:
 
     rows = _with_ratios([
         ('', lambda: run.tick(run.tick_s)),
-        (f'certificate of the defaults ({suite.gait.name})', lambda: certify(
-            **running, voting=voting)),
+        (f'certificate of the defaults ({suite.gait.name})', partial(
+            certify, running_setting(suite))),
         ('another inhibition gain', change(inhibition_gain=lambda n: 400.0 - 1e-3 * n)),
         ('another coupling gain', change(coupling_gain=lambda n: 100.0 + 1e-3 * n)),
         ('another gait', change(other, gait=lambda n: ('trot', 'amble')[n % 2],

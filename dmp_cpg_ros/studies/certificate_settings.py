@@ -8,11 +8,9 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import product
-from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.coupling import (
     TOPOLOGIES,
     CouplingGraph,
@@ -24,6 +22,7 @@ from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.inequality import Certificate
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchronisation
@@ -33,28 +32,24 @@ from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
+from dmp_cpg_ros.studies import network_batch
 from dmp_cpg_ros.studies.draws import log_uniform, random_edges
-from dmp_cpg_ros.studies.network_batch import Setting
 from dmp_cpg_ros.suite import load_gaits
 
 GRAPHS = (*TOPOLOGIES, 'directed')
 GAITS = load_gaits()
 LARGEST_MISMATCH = 0.05
 TICK = 0.004
-SCALE, LEG, POSTURE = BodyScale(0.28, math.hypot(0.19, 0.11)), LegParameters(), PostureParameters()
-
-Arguments = tuple[Any, ...]
-"""What :func:`~dmp_cpg_ros.core.certificates.certify.certify` takes: network, inhibition,
-reference, leg, posture, tick."""
-
+SCALE = BodyScale(0.28, math.hypot(0.19, 0.11))
 
 @dataclass(frozen=True)
 class Case:
     """One setting of the grid, what its certificate requires, and what naive checks would say."""
 
-    arguments: Arguments
-    setting: Setting
+    running: Setting
+    setting: network_batch.Setting
     certificate: Certificate
     free: Synchronisation
     misread: bool
@@ -89,19 +84,20 @@ def grid_case(graph: str, gait: str, gain: float, share: float, region: float, l
     inhibition = InhibitionParameters(
         inhibited_legs=(leg,), region_radius=region * radius,
         inhibition_gain=share * len(LEGS) * omega * radius / (region * radius))
-    arguments = network, inhibition, reference, LEG, POSTURE, TICK
-    certificate = certify(*arguments, required_only=True)
+    running = Setting.of(network, SuiteParameters(
+        inhibition=inhibition, reference=reference), TICK)
+    certificate = certify(running, required_only=True)
     gains = inhibition.armed_gains
     free = synchronisation(network.system.graph, rho)
     omegas = omega * (1.0 - _own_frequencies(network.system, omega, gains, free, inhibition, rng))
-    setting = Setting(network.system, omegas, gains, inhibition.region_radius, graph)
+    setting = network_batch.Setting(network.system, omegas, gains, inhibition.region_radius, graph)
     eigenvalues = np.linalg.eigvals(network.system.graph.block_laplacian()).real
-    return Case(arguments, setting, certificate, free,
+    return Case(running, setting, certificate, free,
                 bool(np.sort(eigenvalues)[len(LEGS)] > rho),
                 certificate['contraction'].right > rho)
 
 
-def random_arguments(rng: np.random.Generator) -> Arguments:
+def random_setting(rng: np.random.Generator) -> Setting:
     """Draw a setting on any graph, with weights, one to four inhibited legs and a tick of 1 to
     10 ms, whose gains may or may not do.
     """
@@ -129,7 +125,8 @@ def random_arguments(rng: np.random.Generator) -> Arguments:
         inhibition_gain=some(0.7, 6.0) * len(LEGS) * omega * radius / region / len(legs))
     leg = LegParameters(stiffness=some(400.0, 2e4), damping=some(20.0, 400.0),
                         activity_rate=some(5.0, 40.0), clearance=float(rng.uniform(0.0, 0.4)))
-    return network, inhibition, reference, leg, POSTURE, float(rng.uniform(0.001, 0.01))
+    return Setting.of(network, SuiteParameters(
+        inhibition=inhibition, reference=reference, leg=leg), float(rng.uniform(0.001, 0.01)))
 
 
 def _couple(network: GaitNetwork, graph: CouplingGraph) -> None:

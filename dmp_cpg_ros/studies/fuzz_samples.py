@@ -31,7 +31,7 @@ from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.analysis.topics import TOPICS
 from dmp_cpg_ros.commands import inspect_robot, learn, walk
 from dmp_cpg_ros.commands.analyze import analyze_run
-from dmp_cpg_ros.commands.certify import running_parameters
+from dmp_cpg_ros.commands.certify import running_setting
 from dmp_cpg_ros.commands.ros_arguments import run_command
 from dmp_cpg_ros.commands.run_folder import run_context
 from dmp_cpg_ros.configuration import find_config, naming
@@ -163,9 +163,8 @@ def make(folder: Path) -> Path:
     np.savetxt(folder / 'csv' / 'reach.csv', table, delimiter=',', header='t,a,b', comments='')
     write_bag(folder / 'mcap' / 'bag', StoragePlugin.MCAP)
     write_bag(folder / 'sqlite' / 'bag', StoragePlugin.SQLITE3)
-    suite = load_suite()
-    running = running_parameters(suite)
-    certificate = [row.as_mapping() for row in certify(**running).inequalities]
+    running = running_setting(load_suite())
+    certificate = [row.as_mapping() for row in certify(running).inequalities]
     shutil.copytree(folder / 'mcap' / 'bag', folder / 'metadata' / 'bag')
     shutil.copytree(folder / 'mcap' / 'bag', folder / 'run' / 'run' / 'bag')
     write_json(folder / 'run' / 'run' / 'manifest.json', {
@@ -174,7 +173,7 @@ def make(folder: Path) -> Path:
                                            'gait': 'amble', 'gaits_file': 'gaits.yaml',
                                            'inhibited_legs': ['fl'], 'terrain': 'flat'}}})
     write_json(folder / 'run' / 'run' / 'metrics.json', {'certificate': certificate})
-    write_json(folder / 'proof' / 'proof.json', proof_of(**running))
+    write_json(folder / 'proof' / 'proof.json', proof_of(running))
     return folder
 
 
@@ -248,8 +247,7 @@ def _scenario(path: Path, _: Path) -> int:
 
 
 def _suite(path: Path, _: Path) -> int:
-    suite = load_suite(path)
-    certify(**running_parameters(suite), voting=suite.parameters.voting)
+    certify(running_setting(load_suite(path)))
     return 0
 
 

@@ -25,8 +25,9 @@ import numpy as np
 from dmp_cpg_ros.analysis.strict_json import to_json
 from dmp_cpg_ros.core.certificates import check_proof, proof
 from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.studies.certificate_settings import Arguments, grid, random_arguments
+from dmp_cpg_ros.studies.certificate_settings import grid, random_setting
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table
 from dmp_cpg_ros.studies.proof_claims import Values, refuted
 from dmp_cpg_ros.studies.spoiled_proofs import DAMAGES, FORGERIES, REFUSALS, damaged, forged
@@ -50,7 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add('--seed', type=int, default=1, help='of the random settings and of what is spoiled')
     options = parser.parse_args(arguments)
     with Workers(options.workers, progress=False) as workers:
-        cases = [case.arguments for case in grid()[::options.every]] if options.every else []
+        cases = [case.running for case in grid()[::options.every]] if options.every else []
         found, drawn = list(workers.map(attempt, cases, 8)), list[tuple[bool, str]]()
         wrong = _told('grid', found)
         while sum(certified for certified, _ in drawn) < options.random:
@@ -88,18 +89,18 @@ def _told(name: str, found: list[tuple[bool, str]]) -> int:
     return missing + unasked + refused
 
 
-def attempt(arguments: Arguments) -> tuple[bool, str]:
+def attempt(s: Setting) -> tuple[bool, str]:
     """Whether a setting is certified, and the text of its proof; empty without one."""
-    certified = certify(*arguments).holds
+    certified = certify(s).holds
     try:
-        return certified, to_json(proof.proof_of(*arguments))
+        return certified, to_json(proof.proof_of(s))
     except ParameterError:
         return certified, ''
 
 
 def random_attempt(seed: tuple[int, int]) -> tuple[bool, str]:
     """The same of a random setting."""
-    return attempt(random_arguments(np.random.default_rng(seed)))
+    return attempt(random_setting(np.random.default_rng(seed)))
 
 
 def accepted(text: str) -> bool:

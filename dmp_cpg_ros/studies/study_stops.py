@@ -33,6 +33,7 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.inhibition import AUTO
 from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.robot_model.grounds import World
@@ -234,9 +235,8 @@ def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
     robot, p = MujocoRobot(suite.robot_file, suite.tick_ns,
                            world=World(friction=cases[0].friction),
                            mismatch=MismatchParameters(payload=cases[0].payload)), suite.parameters
-    certificate = certify(
-        GaitNetwork(p.canonical, gait, body_scale(robot.description)), p.inhibition, p.reference,
-        p.leg, p.posture, suite.tick_ns * 1e-9, voting=p.voting)
+    certificate = certify(Setting.of(
+        GaitNetwork(p.canonical, gait, body_scale(robot.description)), p, suite.tick_ns * 1e-9))
     return list(run_trials(robot, cases, p, certificate.time_to_rest))
 
 

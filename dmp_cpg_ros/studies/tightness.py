@@ -24,7 +24,9 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.certificates import certify, step
+from dmp_cpg_ros.core.certificates import step
+from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.contraction import capture, heterogeneity, inhibited, synchronisation, voting
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
@@ -338,8 +340,7 @@ def rest_row(graph: str) -> Row:
     gait, coupled = load_gait('amble'), CanonicalParameters(coupling_graph=graph)
     canonical = RunningGait(coupled, BodyScale(0.28, 0.22), KnownGaits({gait.name: gait}))
     network = canonical.network(gait)
-    bound = certify.certify(
-        network, p.inhibition, p.reference, p.leg, p.posture, tick).time_to_rest
+    bound = certify(Setting.of(network, p, tick)).time_to_rest
     supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
     fastest = np.array([p.reference.max_speed, p.reference.max_lateral_speed,
                         p.reference.max_turn_rate])

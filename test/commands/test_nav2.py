@@ -205,7 +205,7 @@ def test_the_map_is_a_free_field() -> None:
 def test_a_reached_goal_is_a_certified_stop() -> None:
     """As Nav2 ends a path: slower from a distance on, then zero; the suite stops by itself."""
     pytest.importorskip('mujoco')
-    from dmp_cpg_ros.commands.certify import running_parameters
+    from dmp_cpg_ros.commands.certify import running_setting
     from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 
     suite = load_suite(None, {'max_speed': 0.8})
@@ -227,6 +227,6 @@ def test_a_reached_goal_is_a_certified_stop() -> None:
         if reached and loop.stop.state == 'at_rest' and loop.stop.automatic:
             break
     assert reached and loop.stop.state == 'at_rest' and loop.stop.automatic
-    certificate = certify(**running_parameters(suite))
+    certificate = certify(running_setting(suite))
     assert certificate.holds and loop.stop.measured_s <= certificate.time_to_rest
     assert abs(goal - state.base_position_in_world[0]) < tolerance

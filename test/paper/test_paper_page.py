@@ -21,7 +21,7 @@ import pytest
 from browser import Page as BrowserPage
 from browser import browser, find_browser
 
-from dmp_cpg_ros.commands.certify import running_parameters
+from dmp_cpg_ros.commands.certify import running_setting
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.paper.interactive import Page
@@ -52,7 +52,7 @@ def blocks(html: str) -> dict[str, bytes]:
 def test_its_certificate_is_that_of_the_suite(changes: dict[str, Any]) -> None:
     set_ = {('inhibited_legs' if name == 'leg' else name): [value] if name == 'leg' else value
             for name, value in changes.items()}
-    expected = certify(**running_parameters(load_suite(overrides=set_)))
+    expected = certify(running_setting(load_suite(overrides=set_)))
     found = answer('certificate', **changes)
     assert {name: found[name] for name in expected.as_mapping()} == json.loads(
         json.dumps(expected.as_mapping()))

@@ -11,6 +11,7 @@ from checkout import ROOT
 from core_examples import TICK, network, suite_parameters
 
 from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS
 
 CONDITIONS = {'in places', 'together', 'holding', 'prediction', 'quickness', 'applied'}
@@ -29,8 +30,8 @@ def test_the_proof_has_all_its_lines() -> None:
 
 def test_every_line_names_an_inequality_that_certify_prints_or_a_condition() -> None:
     p = suite_parameters()
-    rows = {row.name for row in certify(network(), p.inhibition, p.reference, p.leg, p.posture,
-                                        TICK).inequalities} | {'votes_suffice'}
+    rows = {row.name for row in certify(
+        Setting.of(network(), p, TICK)).inequalities} | {'votes_suffice'}
     for line in lines():
         conditions = set(re.findall(r'\*([a-z ]+)\*', line[2]))
         named = set(re.findall(r'`([a-z_]+)`', line[2]))
@@ -49,8 +50,8 @@ def test_every_line_names_a_test_that_exists() -> None:
 def test_what_rests_on_a_sampled_inequality_says_so() -> None:
     p = suite_parameters()
     coarse = network(rho=60.0, coupling_gain=400.0, coupling_graph='path')
-    found = certify(coarse, replace(p.inhibition, inhibition_gain=2000.0), p.reference, p.leg,
-                    p.posture, TICK)
+    found = certify(Setting.of(
+        coarse, replace(p, inhibition=replace(p.inhibition, inhibition_gain=2000.0)), TICK))
     assert found.sampled
     for name in found.sampled:
         line = next(line for line in lines() if f'`{name}`' in line[2])
@@ -59,8 +60,7 @@ def test_what_rests_on_a_sampled_inequality_says_so() -> None:
 
 def test_what_is_proved_of_the_equation_alone_is_said_to_be_weaker() -> None:
     p = suite_parameters()
-    rows = certify(network(contact_feedback=True), p.inhibition, p.reference, p.leg, p.posture,
-                   TICK).inequalities
+    rows = certify(Setting.of(network(contact_feedback=True), p, TICK)).inequalities
     text = (ROOT / 'doc' / 'certificate.md').read_text(encoding='utf-8')
     weaker = text.split('### What is weaker than a proof')[1].split('## Delays')[0]
     for row in rows:

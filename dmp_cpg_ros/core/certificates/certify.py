@@ -18,10 +18,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.coupling import degrees
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
-from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.certificates import network as of_network
 from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, discharged
@@ -36,65 +34,34 @@ from dmp_cpg_ros.core.contraction.hopf_bounds import transverse_contraction
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, NONE, REGIONAL
 from dmp_cpg_ros.core.contraction.region import Annulus
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
-from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.entry import SMALLEST_RADIUS, eligible_legs
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, REST_ACTIVITY
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.reference.filter import ReferenceParameters
-from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 from dmp_cpg_ros.core.reference.stop_distance import stop_distance
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.foot_path import FootPath
-from dmp_cpg_ros.core.transformation.leg import LegParameters
-from dmp_cpg_ros.core.voting.parameters import VotingParameters
 
 
-def certify(network: GaitNetwork, inhibition: InhibitionParameters,
-            reference: ReferenceParameters, leg: LegParameters, posture: PostureParameters,
-            tick_s: float, span: OperatingRange | None = None,
-            voting: VotingParameters | None = None, required_only: bool = False) -> Certificate:
+def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = False,
+            until_lost: bool = False) -> Certificate:
     """Compute the certificate of running parameters.
 
     Parameters
     ----------
-    network : GaitNetwork
-        Oscillators, couplings, gait and the robot's scale.
-    inhibition : InhibitionParameters
-        Gain, region, legs.
-    reference : ReferenceParameters
-        Rate and limits: they decide the highest cadence.
-    leg, posture : LegParameters, PostureParameters
-        Transformation systems and swing filters.
-    tick_s : float
-        Control tick [s].
-    span : OperatingRange, optional
-        Cadences to hold for, when they are not those of the gait.
-    voting : VotingParameters, optional
-        Stopping by vote; without, nothing is certified about it.
+    s : Setting
+        What runs.
+    legs : collection of int
+        Where ``auto`` chooses the leg, those of which the worst is certified; the eligible ones
+        without.
     required_only : bool
         Whether inequalities that are not required are left out, which are most of the work.
+    until_lost : bool
+        Whether rows after a required one that does not hold may be missing: so it is known at a
+        fraction of the cost that the certificate does not hold.
 
     Returns
     -------
     Certificate
-
-    Raises
-    ------
-    ParameterError
-        If the tick is not positive and finite.
-    """
-    parts = SuiteParameters(reference=reference, inhibition=inhibition, leg=leg, posture=posture,
-                            voting=voting or VotingParameters())
-    return certificate_of(Setting.of(network, parts, tick_s, span), required_only=required_only)
-
-
-def certificate_of(s: Setting, legs: Collection[int] = (), *, required_only: bool = False,
-                   until_lost: bool = False) -> Certificate:
-    """Certificate of a setting; where the leg is chosen, the worst of those given or eligible.
-
-    With ``until_lost`` rows after a required one that does not hold may be missing: so it is known
-    at a fraction of the cost that the certificate does not hold.
     """
     p = s.parameters.inhibition
     if not p.auto:

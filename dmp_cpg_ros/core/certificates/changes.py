@@ -17,7 +17,7 @@ from dataclasses import replace
 from functools import lru_cache
 from itertools import combinations
 
-from dmp_cpg_ros.core.certificates.certify import certificate_of
+from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, discharged
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.votes import vote_inequalities
@@ -55,7 +55,7 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
     required_only : bool
         Whether inequalities that are not required are left out, which are most of the work.
     until_lost : bool
-        As for :func:`~dmp_cpg_ros.core.certificates.certify.certificate_of`.
+        As for :func:`~dmp_cpg_ros.core.certificates.certify.certify`.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
                       else max(farthest_way(network, p.inhibition) for network in networks))
     # A gait that changes at rest keeps the leg that holds it.
     legs = set[int]().union(*(eligible_legs(network, p.inhibition) for network in networks))
-    whole = certificate_of(setting, legs, required_only=required_only, until_lost=until_lost)
+    whole = certify(setting, legs, required_only=required_only, until_lost=until_lost)
     if until_lost and not whole.holds:
         return whole
     pause = 0.0 if not ways else (

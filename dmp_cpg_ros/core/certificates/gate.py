@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import AUTO, Inhibition
-from dmp_cpg_ros.core.certificates.certify import certificate_of
+from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.changes import all_networks, certify_changes, refused_change
 from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.certificates.network import Setting
@@ -235,8 +235,8 @@ def _certificate(of: Running, whole: bool, until_lost: bool = False) -> Certific
             of.parameters, (of.gait, *of.others), of.scale, of.tick_s, of.acting_cadence,
             required_only=not whole, until_lost=until_lost)
     network = GaitNetwork(of.parameters.canonical, of.gait, of.scale)
-    return certificate_of(Setting.of(network, of.parameters, of.tick_s),
-                          required_only=not whole, until_lost=until_lost)
+    return certify(Setting.of(network, of.parameters, of.tick_s),
+                   required_only=not whole, until_lost=until_lost)
 
 
 @dataclass(frozen=True)

@@ -17,20 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.balance.controller import PostureParameters
-from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates import check_proof as exact
-from dmp_cpg_ros.core.certificates.network import NetworkAnalysis, analyse_network
+from dmp_cpg_ros.core.certificates.network import NetworkAnalysis, Setting, analyse_network
 from dmp_cpg_ros.core.certificates.step import cycle_radius_error
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL
 from dmp_cpg_ros.core.contraction.synchronisation import cascade_weights, slowest_rate
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.reference.filter import ReferenceParameters
-from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
-from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 Values = dict[str, Any]
 
@@ -40,15 +34,13 @@ _MOST_STEPS = 10_000  # of the grid, from a guess
 _CASCADE = 2.0**-64  # weight of a component of a graph, as a share of those before it
 
 
-def proof_of(network: GaitNetwork, inhibition: InhibitionParameters,
-             reference: ReferenceParameters, leg: LegParameters, posture: PostureParameters,
-             tick_s: float) -> Values:
+def proof_of(s: Setting) -> Values:
     """Prove the required inequalities of a gait without voting and contact feedback.
 
     Parameters
     ----------
-    network, inhibition, reference, leg, posture, tick_s
-        As of :func:`~dmp_cpg_ros.core.certificates.certify.certify`.
+    s : Setting
+        What runs.
 
     Returns
     -------
@@ -61,14 +53,13 @@ def proof_of(network: GaitNetwork, inhibition: InhibitionParameters,
     ParameterError
         If an inequality fails, or holds too narrowly for these witnesses.
     """
-    if inhibition.auto:
+    if s.parameters.inhibition.auto:
         raise ParameterError('a proof is for inhibited_legs that are named, not for auto')
-    if reference.braking:
+    if s.parameters.reference.braking:
         raise ParameterError('a proof is for a reference without braking')
-    span = operating_range(network, inhibition, reference)
-    analysis = analyse_network(network, inhibition, span)
-    p = _parameters(network, inhibition, reference, leg, posture, tick_s, span, analysis)
-    shares = cascade_weights(network.system.graph, _CASCADE) if (
+    analysis = analyse_network(s.network, s.parameters.inhibition, s.span)
+    p = _parameters(s, analysis)
+    shares = cascade_weights(s.network.system.graph, _CASCADE) if (
         analysis.found.weights is None) else analysis.found.weights
     reason = 'it does not contract'
     reaches = (False, True) if analysis.contraction.reach == GLOBAL else (True,)
@@ -89,25 +80,25 @@ def written(p: Values, w: Values, rows: Values) -> Values:
             'witnesses': _written(w), 'rows': _written(rows)}
 
 
-def _parameters(network: GaitNetwork, inhibition: InhibitionParameters,
-                reference: ReferenceParameters, leg: LegParameters, posture: PostureParameters,
-                tick_s: float, span: OperatingRange, analysis: NetworkAnalysis) -> Values:
+def _parameters(s: Setting, analysis: NetworkAnalysis) -> Values:
     """Numbers that the suite runs with, as the fractions that they are."""
-    graph = network.system.graph
+    oscillators, span, leg = s.network.parameters, s.span, s.parameters.leg
+    graph = s.network.system.graph
     coupling = np.zeros((graph.size, graph.size))
     for (i, j), gain in zip(graph.edges, graph.gains, strict=True):
         coupling[i, j] = gain[0, 0]
     if not np.array_equal(graph.gains, graph.gains[:, :1, :1] * np.eye(2)):
         raise ParameterError('no exact proof is known for couplings other than k_ij I')
     values = {
-        'rho': network.parameters.rho, 'radius': network.parameters.radius,
-        'region_radius': inhibition.region_radius, 'tick': tick_s,
+        'rho': oscillators.rho, 'radius': oscillators.radius,
+        'region_radius': s.parameters.inhibition.region_radius, 'tick': s.tick_s,
         'omega_max': span.omega[1], 'omega_at_rest': span.omega_at_rest,
         'omega_armed_min': span.omega_armed[0], 'omega_armed_max': span.omega_armed[1],
         'omega_slope': span.omega_slope, 'foot_speed': span.foot_speed,
-        'armed_speed': span.armed_speed, 'alpha_r': reference.alpha_r,
+        'armed_speed': span.armed_speed, 'alpha_r': s.parameters.reference.alpha_r,
         'activity_rate': leg.activity_rate, 'stiffness': leg.stiffness, 'damping': leg.damping,
-        'slowest_filter': min(leg.activity_rate, leg.placement_rate, posture.activity_rate),
+        'slowest_filter': min(leg.activity_rate, leg.placement_rate,
+                              s.parameters.posture.activity_rate),
         'clearance': leg.clearance}
     return {**{name: Fraction(value) for name, value in values.items()},
             'coupling': [[Fraction(k) for k in row] for row in coupling.tolist()],

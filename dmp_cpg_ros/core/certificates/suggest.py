@@ -8,14 +8,10 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from dmp_cpg_ros.core.balance.controller import PostureParameters
-from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.inequality import Certificate
-from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.maths.roots import last_that_holds
-from dmp_cpg_ros.core.reference.filter import ReferenceParameters
-from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.core.voting.parameters import VotingParameters
 
 MARGIN = 1.25
@@ -49,12 +45,13 @@ class Suggestion:
     changed: bool
 
 
-def suggest_gains(network: GaitNetwork, inhibition: InhibitionParameters,
-                  reference: ReferenceParameters, leg: LegParameters, posture: PostureParameters,
-                  tick_s: float, voting: VotingParameters | None = None) -> Suggestion | None:
+def suggest_gains(s: Setting) -> Suggestion | None:
     """Raise the gains, inhibition before coupling, until the certificate holds.
 
-    Parameters are those of :func:`~dmp_cpg_ros.core.certificates.certify.certify`.
+    Parameters
+    ----------
+    s : Setting
+        What runs.
 
     Returns
     -------
@@ -62,24 +59,27 @@ def suggest_gains(network: GaitNetwork, inhibition: InhibitionParameters,
         The present gains when they hold; None when an inequality fails that gains cannot mend, or
         no gains within the parameters' ranges are enough.
     """
-    def at(k: float, k_inh: float, voting: VotingParameters | None = None,
-           required_only: bool = False) -> Certificate:
-        return certify(network.with_parameters(replace(network.parameters, coupling_gain=k)),
-                       replace(inhibition, inhibition_gain=k_inh), reference, leg, posture,
-                       tick_s, voting=voting, required_only=required_only)
+    network, p = s.network, s.parameters
 
-    k0, k_inh0 = network.parameters.coupling_gain, inhibition.inhibition_gain
-    present, k = at(k0, k_inh0, voting), k0
+    def at(k: float, k_inh: float, whole: bool = True) -> Certificate:
+        return certify(Setting.of(
+            network.with_parameters(replace(network.parameters, coupling_gain=k)),
+            replace(p, inhibition=replace(p.inhibition, inhibition_gain=k_inh),
+                    voting=p.voting if whole else VotingParameters()), s.tick_s),
+            required_only=not whole)
+
+    k0, k_inh0 = network.parameters.coupling_gain, p.inhibition.inhibition_gain
+    present, k = at(k0, k_inh0), k0
     if present.holds:
         return Suggestion(k0, k_inh0, present, False)
     while k <= _LARGEST_COUPLING:
         k_inh = k_inh0
         while k_inh <= _LARGEST_INHIBITION:
-            found = at(k, k_inh, required_only=True)
+            found = at(k, k_inh, whole=False)
             if found.holds and (k == k0 or all(
                     MARGIN * found[name].left <= found[name].right
                     for name in ('synchronisation', 'contraction'))):  # those of the coupling
-                found = at(k, k_inh, voting)
+                found = at(k, k_inh)
                 if found.holds:
                     return Suggestion(k, k_inh, found, True)
                 break  # the votes of some legs may still need stronger couplings

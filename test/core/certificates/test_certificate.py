@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify, spring_damper_contraction
 from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.suggest import nearest_values, suggest_gains
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
@@ -28,8 +28,7 @@ GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 
 def certificate(gait: str = 'amble', tick: float = TICK, suite: SuiteParameters | None = None,
                 **canonical: object) -> Certificate:
-    p = suite or SuiteParameters()
-    return certify(network(gait, **canonical), p.inhibition, p.reference, p.leg, p.posture, tick)
+    return certify(Setting.of(network(gait, **canonical), suite or SuiteParameters(), tick))
 
 
 def with_inhibition(**changes: object) -> SuiteParameters:
@@ -152,7 +151,7 @@ def test_joints_contract_at_their_slowest_eigenvalue(stiffness: float, damping: 
 def test_suggested_gains_hold(graph: str, gain: float, inhibition_gain: float) -> None:
     p = with_inhibition(inhibition_gain=inhibition_gain)
     start = network('amble', coupling_graph=graph, coupling_gain=gain)
-    found = suggest_gains(start, p.inhibition, p.reference, p.leg, p.posture, TICK)
+    found = suggest_gains(Setting.of(start, p, TICK))
     assert found is not None and found.changed and found.certificate.holds
     again = certificate(
         suite=with_inhibition(inhibition_gain=found.inhibition_gain), coupling_graph=graph,
@@ -162,10 +161,10 @@ def test_suggested_gains_hold(graph: str, gain: float, inhibition_gain: float) -
 
 def test_gains_that_hold_are_kept_and_what_gains_cannot_mend_is_not_promised() -> None:
     p = SuiteParameters()
-    kept = suggest_gains(network(), p.inhibition, p.reference, p.leg, p.posture, TICK)
+    kept = suggest_gains(Setting.of(network(), p, TICK))
     assert kept is not None and not kept.changed
-    never = replace(p.inhibition, capture_speed=0.0)
-    assert suggest_gains(network(), never, p.reference, p.leg, p.posture, TICK) is None
+    never = with_inhibition(capture_speed=0.0)
+    assert suggest_gains(Setting.of(network(), never, TICK)) is None
 
 
 def test_the_nearest_value_that_works_works_and_a_little_further_does_not() -> None:

@@ -94,7 +94,7 @@ def test_the_grid_has_every_kind_of_setting_certified_and_not() -> None:
 
 def test_what_is_required_is_the_same_without_the_rest() -> None:
     for case in grid()[::64]:
-        whole = certify(*case.arguments)
+        whole = certify(case.running)
         required = tuple(row for row in whole.inequalities if row.required)
         assert str(required) == str(tuple(
             row for row in case.certificate.inequalities if row.required))
@@ -188,5 +188,5 @@ def test_settings_that_contract_without_capture_are_refused_and_some_walk_on(gra
 
 def test_a_setting_has_a_proof_if_and_only_if_it_is_certified() -> None:
     for case in grid()[3::87]:
-        certified, text = attempt(case.arguments)
+        certified, text = attempt(case.running)
         assert certified == case.certificate.holds == bool(text) == (bool(text) and accepted(text))

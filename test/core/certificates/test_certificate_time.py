@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from core_examples import TICK, network
 
-from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.timing import time_to_places
 from dmp_cpg_ros.core.gait.network import GaitNetwork
@@ -25,7 +25,14 @@ from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.core.voting.parameters import VotingParameters
 
-LEG, POSTURE = LegParameters(), PostureParameters()
+LEG = LegParameters()
+
+
+def certificate(gait: GaitNetwork, inhibition: InhibitionParameters | None = None,
+                reference: ReferenceParameters | None = None) -> Certificate:
+    return certify(Setting.of(gait, SuiteParameters(
+        inhibition=inhibition or InhibitionParameters(),
+        reference=reference or ReferenceParameters()), TICK))
 
 
 class Gait:
@@ -86,7 +93,7 @@ def settings() -> list[tuple[str, dict[str, object], InhibitionParameters, Refer
 def test_no_stop_takes_longer_than_its_bound_from_any_phase_and_speed(case: int) -> None:
     gait, canonical, inhibition, reference = settings()[case]
     oscillators = network(gait, **canonical)
-    found = certify(oscillators, inhibition, reference, LEG, POSTURE, TICK)
+    found = certificate(oscillators, inhibition, reference)
     assert found.holds, found.explained()
     limits = np.array([reference.max_speed, reference.max_lateral_speed, reference.max_turn_rate])
     longest = 0.0
@@ -104,7 +111,7 @@ def test_no_start_takes_longer_than_its_bound_and_stops_within_starts_keep_their
         case: int) -> None:
     gait, canonical, inhibition, reference = settings()[case]
     oscillators = network(gait, **canonical)
-    found = certify(oscillators, inhibition, reference, LEG, POSTURE, TICK)
+    found = certificate(oscillators, inhibition, reference)
     speed = np.array([reference.max_speed, 0.0, 0.0])
     run = Gait(oscillators, inhibition, reference, oscillators.locked_state(), 0.2 * speed)
     run.until('at_rest', True, 5.0)
@@ -142,8 +149,8 @@ def test_free_legs_are_in_their_places_within_the_bound_from_inside_and_outside(
 
 
 def test_the_bound_grows_with_the_distance_to_the_speed_of_capture() -> None:
-    bounds = [certify(network(), InhibitionParameters(capture_speed=speed), ReferenceParameters(),
-                      LEG, POSTURE, TICK).time_to_rest for speed in (0.05, 0.1, 0.4)]
+    bounds = [certificate(network(), InhibitionParameters(capture_speed=speed)).time_to_rest
+              for speed in (0.05, 0.1, 0.4)]
     assert bounds[0] > bounds[1] > bounds[2]
 
 
@@ -192,7 +199,7 @@ def test_a_reference_that_speeds_up_when_a_stop_is_requested_keeps_the_bound() -
 
 def test_the_certificate_bounds_the_way_from_the_largest_speed() -> None:
     reference = ReferenceParameters(max_speed=1.2, max_lateral_speed=0.5)
-    found = certify(network(), InhibitionParameters(), reference, LEG, POSTURE, TICK)
+    found = certificate(network(), reference=reference)
     assert found.distance_to_rest == stop_distance(reference, 1.3, 1.3, TICK)
     assert found.as_mapping()['distance_to_rest_m'] == found.distance_to_rest
 

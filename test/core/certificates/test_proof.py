@@ -11,6 +11,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from itertools import count
 from pathlib import Path
@@ -27,6 +28,7 @@ from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates import check_proof
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.inequality import STEP_ROWS, Certificate
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.proof import proof_of
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
@@ -35,11 +37,16 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 P = suite_parameters()
 
 
+def running(gait: GaitNetwork, inhibition: InhibitionParameters = P.inhibition,
+            tick: float = TICK) -> Setting:
+    return Setting.of(gait, replace(P, inhibition=inhibition), tick)
+
+
 def proof(gait: GaitNetwork, inhibition: InhibitionParameters = P.inhibition,
           tick: float = TICK) -> dict[str, Any]:
     """As it stands in a file."""
     found: dict[str, Any] = json.loads(json.dumps(
-        proof_of(gait, inhibition, P.reference, P.leg, P.posture, tick), allow_nan=False))
+        proof_of(running(gait, inhibition, tick)), allow_nan=False))
     return found
 
 
@@ -67,7 +74,7 @@ def settings(seeds: Iterable[int], share: tuple[float, float]
             inhibition_gain=some(60.0, 6000.0), region_radius=radius * some(0.03, 1.2),
             inhibited_legs=tuple(rng.permutation(LEGS)[:rng.integers(1, 4)].tolist()))
         tick = float(rng.choice([0.001, 0.004, 0.01]))
-        certificate = certify(gait, inhibition, P.reference, P.leg, P.posture, tick)
+        certificate = certify(running(gait, inhibition, tick))
         if certificate.holds:
             yield gait, inhibition, tick, certificate
 
@@ -75,7 +82,7 @@ def settings(seeds: Iterable[int], share: tuple[float, float]
 @pytest.mark.parametrize('gait', GAITS)
 def test_every_gait_has_a_proof_of_every_inequality(gait: str) -> None:
     found = check_proof.check(proof(network(gait)))
-    certificate = certify(network(gait), P.inhibition, P.reference, P.leg, P.posture, TICK)
+    certificate = certify(running(network(gait)))
     assert set(found) == {row.name for row in certificate.inequalities if row.required} - {
         *STEP_ROWS} | {'premises', 'time_step'}
     assert float(found['synchronisation'][1]) == pytest.approx(
@@ -111,7 +118,7 @@ def test_settings_that_contract_on_a_region_alone_have_proofs() -> None:
 def test_graphs_whose_components_follow_one_another_have_proofs(edges: Edges) -> None:
     gait = coupled(edges, np.eye(2))
     inhibition = InhibitionParameters(inhibition_gain=2000.0)
-    certificate = certify(gait, inhibition, P.reference, P.leg, P.posture, TICK)
+    certificate = certify(running(gait, inhibition))
     assert certificate.holds, certificate.explained()
     found = check_proof.check(proof(gait, inhibition))
     assert float(found['synchronisation'][1]) == pytest.approx(

@@ -13,6 +13,7 @@ from core_examples import TICK, network, suite_parameters
 
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.inequality import STEP_ROWS, Certificate
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.contraction.hopf_bounds import largest_radial, largest_shifted
 from dmp_cpg_ros.core.maths.exponential import ExponentialStep
 from dmp_cpg_ros.core.maths.step_comparison import StepComparison
@@ -26,21 +27,20 @@ from dmp_cpg_ros.studies.adversary_steps import (
     in_box,
     locked_step,
 )
-from dmp_cpg_ros.studies.certificate_settings import random_arguments
+from dmp_cpg_ros.studies.certificate_settings import random_setting
 
 
 def settings() -> list[Analysed]:
     """The suite's defaults on every graph, and random settings whose step is proved."""
     p = suite_parameters()
-    found = [analysed((network('amble', coupling_graph=graph, **changes), p.inhibition,
-                       p.reference, p.leg, p.posture, tick))
+    found = [analysed(Setting.of(network('amble', coupling_graph=graph, **changes), p, tick))
              for graph in ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
              for changes, tick in (({}, TICK), ({'coupling_gain': 60.0}, 0.01))]
     rng = np.random.default_rng(0)
     while len(found) < 40:
-        arguments = random_arguments(rng)
-        if certify(*arguments, required_only=True).holds:
-            found.append(analysed(arguments))
+        setting = random_setting(rng)
+        if certify(setting, required_only=True).holds:
+            found.append(analysed(setting))
     assert sum(one.proved for _, _, one in found) >= 36
     return [one for one in found if one[2].proved]
 
@@ -143,8 +143,8 @@ def test_steps_of_free_legs_shrink_their_disagreement(k: int) -> None:
 
 def test_a_vanishing_tick_gives_the_rates_of_the_equation() -> None:
     p = suite_parameters()
-    _, analysis, fine = analysed((network(), p.inhibition, p.reference, p.leg, p.posture, 2e-5))
-    _, _, coarse = analysed((network(), p.inhibition, p.reference, p.leg, p.posture, TICK))
+    _, analysis, fine = analysed(Setting.of(network(), p, 2e-5))
+    _, _, coarse = analysed(Setting.of(network(), p, TICK))
     np.testing.assert_allclose(fine.distance, analysis.capture.distance, rtol=1e-3)
     needed = analysis.capture.needed_gain[0] / analysis.capture.gains[0]
     # a node at the edge of C moves inwards at (1 - needed) of what inhibition alone does
@@ -158,8 +158,8 @@ def test_votes_and_unequal_frequencies_still_rest_on_what_is_sampled() -> None:
     p = suite_parameters()
 
     def certificate(voting: bool, **canonical: object) -> Certificate:
-        return certify(network('amble', **canonical), p.inhibition, p.reference, p.leg, p.posture,
-                       TICK, voting=VotingParameters(voting=voting))
+        return certify(Setting.of(network('amble', **canonical), replace(
+            p, voting=VotingParameters(voting=voting)), TICK))
 
     plain = certificate(False)
     assert plain.sampled == () and not plain['time_step'].required
@@ -171,9 +171,9 @@ def test_votes_and_unequal_frequencies_still_rest_on_what_is_sampled() -> None:
 
 def test_a_step_that_is_not_proved_is_not_required_to_be() -> None:
     p = suite_parameters()
-    coarse = certify(
+    coarse = certify(Setting.of(
         network('amble', rho=60.0, coupling_gain=400.0, coupling_graph='path'),
-        replace(p.inhibition, inhibition_gain=2000.0), p.reference, p.leg, p.posture, TICK)
+        replace(p, inhibition=replace(p.inhibition, inhibition_gain=2000.0)), TICK))
     assert not all(coarse[row].holds for row in STEP_ROWS)
     assert coarse['time_step'].required and not any(coarse[row].required for row in STEP_ROWS)
     assert 'time_step' in coarse.sampled and coarse['capture'].grade == 'continuous'

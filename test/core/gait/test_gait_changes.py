@@ -16,6 +16,7 @@ from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.changes import certify_changes
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares, shares_of
 from dmp_cpg_ros.core.gait.network import GaitNetwork
@@ -206,8 +207,7 @@ def test_a_certificate_of_changes_is_no_better_than_those_of_the_gaits() -> None
     both = certify_changes(p, [GAITS['amble'], GAITS['pronk']], SCALE, TICK)
     assert both.holds and both['offset_rate'].holds
     for name in ('amble', 'pronk'):
-        network = GaitNetwork(p.canonical, GAITS[name], SCALE)
-        alone = certify(network, p.inhibition, p.reference, p.leg, p.posture, TICK)
+        alone = certify(Setting.of(GaitNetwork(p.canonical, GAITS[name], SCALE), p, TICK))
         assert both.time_to_rest > alone.time_to_rest
         assert both['capture'].margin <= alone['capture'].margin
 

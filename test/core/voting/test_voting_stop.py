@@ -89,8 +89,7 @@ def test_a_certified_majority_whose_legs_relieve_each_other_stops_and_fewer_do_n
         graph: str) -> None:
     canonical = CanonicalParameters(coupling_graph=graph)
     p = SuiteParameters(**voters(inhibited_legs=LEGS[:3]))
-    assert certify(network(coupling_graph=graph), p.inhibition, p.reference, p.leg, p.posture,
-                   TICK, voting=p.voting).holds
+    assert certify(Setting.of(network(coupling_graph=graph), p, TICK)).holds
     for missing in LEGS:
         run = walking('amble', **voters(inhibited_legs=LEGS[:3]), canonical=canonical)
         majority = tuple(leg for leg in LEGS if leg != missing)
@@ -202,9 +201,7 @@ def test_without_voting_nobody_is_heard() -> None:
 
 
 def certificate(parts: dict[str, Any], gait: str = 'amble', **canonical: object) -> Certificate:
-    p = SuiteParameters(**parts)
-    return certify(network(gait, **canonical), p.inhibition, p.reference, p.leg, p.posture, TICK,
-                   voting=p.voting)
+    return certify(Setting.of(network(gait, **canonical), SuiteParameters(**parts), TICK))
 
 
 @pytest.mark.parametrize('graph', ['all_to_all', 'ring'])
@@ -255,14 +252,13 @@ def test_as_many_votes_are_needed_as_are_wanted(majority: int) -> None:
 
 def test_gains_are_suggested_with_which_votes_are_certified_too() -> None:
     p = SuiteParameters(**voters(inhibited_legs=LEGS[:3]))
-    running = (network('pronk', coupling_gain=5.0), p.inhibition, p.reference, p.leg, p.posture,
-               TICK)
-    certified = certify(*running, voting=p.voting)
-    assert [entry.name for entry in certified.failing] == ['votes_needed']
-    found = suggest_gains(*running, p.voting)
+    running = Setting.of(network('pronk', coupling_gain=5.0), p, TICK)
+    assert [entry.name for entry in certify(running).failing] == ['votes_needed']
+    found = suggest_gains(running)
     assert found is not None and found.changed and found.certificate['votes_needed'].holds
     fast = replace(p.inhibition, capture_speed=1.0)          # minorities meet slower legs
-    assert suggest_gains(network(coupling_graph='path'), fast, *running[2:], p.voting) is None
+    assert suggest_gains(Setting.of(
+        network(coupling_graph='path'), replace(p, inhibition=fast), TICK)) is None
 
 
 def test_nobody_is_certain_to_stop_legs_that_are_not_coupled_enough() -> None:
