@@ -211,29 +211,6 @@ def _blocks(file: BinaryIO) -> Iterator[_Block]:
         at += 9 + size
 
 
-def decoded(reader: AnyReader, connections: Collection[Connection], skipped: Counter[str],
-            ) -> Iterator[tuple[Connection, int, Any]]:
-    """Messages of some connections with their record times [ns], in the order of these.
-
-    Parameters
-    ----------
-    reader : AnyReader
-        Open.
-    connections : collection of Connection
-        Those that are wanted.
-    skipped : Counter
-        Gets by topic how many messages were left out because they could not be decoded; a warning
-        names them at the end.
-    """
-    for connection, bag_ns, raw in recorded(reader, connections):
-        message = message_of(raw, connection.msgtype)
-        if message is None:
-            skipped[connection.topic] += 1
-        else:
-            yield connection, bag_ns, message
-    warn_of(skipped)
-
-
 def warn_of(skipped: Counter[str]) -> None:
     """Name the topics of messages that were left out, if there are any."""
     if skipped:

@@ -30,11 +30,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.contraction.capture_anywhere import Interval
-from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED, Finding
-from dmp_cpg_ros.core.contraction.region import Box, Region
+from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation_complement
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.paper.jacobians import Array, Field, numerical_jacobian
+from dmp_cpg_ros.paper.region import Box, Finding, Region
 
 Matrix = Callable[[Array], Array]
 """Matrix at a state, ndarray (n,) → (n, n)."""

@@ -30,10 +30,10 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
-from dmp_cpg_ros.core.contraction.hopf_bounds import transverse_contraction
-from dmp_cpg_ros.core.contraction.region import Annulus
+from dmp_cpg_ros.core.contraction.hopf_bounds import transverse_rate
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.paper.jacobians import Array, Field
+from dmp_cpg_ros.paper.region import Annulus
 
 _MOST_PERIODS = 200
 _MOST_STEPS = 100_000
@@ -290,5 +290,5 @@ def hopf_tube(oscillator: AndronovHopf, omega: float, disturbance: float
     inner, outer = (float(np.roots([1.0, 0.0, -r * r, w / rho]).real.max())
                     for w in (disturbance, -disturbance))
     annulus = Annulus(inner, max(outer, inner))
-    rate = transverse_contraction(oscillator, omega, annulus).rate
+    rate = transverse_rate(rho, r, omega, annulus.inner, annulus.outer)
     return tube_radius(rate, annulus.outer / annulus.inner, disturbance), annulus

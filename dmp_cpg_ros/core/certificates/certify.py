@@ -19,7 +19,6 @@ from dataclasses import replace
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.coupling import degrees
-from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.certificates import network as of_network
 from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, discharged
@@ -30,9 +29,8 @@ from dmp_cpg_ros.core.certificates.votes import vote_inequalities
 from dmp_cpg_ros.core.contraction import hierarchy
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, PROVED
-from dmp_cpg_ros.core.contraction.hopf_bounds import transverse_contraction
+from dmp_cpg_ros.core.contraction.hopf_bounds import transverse_rate
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, NONE, REGIONAL
-from dmp_cpg_ros.core.contraction.region import Annulus
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
 from dmp_cpg_ros.core.inhibition.entry import SMALLEST_RADIUS, eligible_legs
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, REST_ACTIVITY
@@ -217,13 +215,12 @@ def hierarchy_inequalities(s: Setting, found: Synchronisation) -> list[Inequalit
     spring, _ = spring_damper_contraction(leg.stiffness, leg.damping)
     filters = min(leg.activity_rate, leg.placement_rate, s.parameters.posture.activity_rate)
     hold = p.contact_hold if p.contact_feedback else 0.0      # late feet may hold the phase back
-    oscillator = transverse_contraction(
-        AndronovHopf(p.rho, p.radius), (1.0 - hold) * s.span.omega[0],
-        Annulus(_INNER * p.radius, p.radius))
+    oscillator = transverse_rate(
+        p.rho, p.radius, (1.0 - hold) * s.span.omega[0], _INNER * p.radius, p.radius)
     alpha_r = s.parameters.reference.alpha_r
     whole = hierarchy.coupled_primitives(
         hierarchy.Part('reference', hierarchy.CONTRACTING, alpha_r),
-        hierarchy.Part('oscillator', hierarchy.TRANSVERSE, oscillator.rate), found,
+        hierarchy.Part('oscillator', hierarchy.TRANSVERSE, oscillator), found,
         [hierarchy.Part('swing filters', hierarchy.CONTRACTING, filters),
          hierarchy.Part('joints', hierarchy.CONTRACTING, spring)])
     return [

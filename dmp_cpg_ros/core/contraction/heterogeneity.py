@@ -88,12 +88,7 @@ def disagreement_bound(rate: float, disturbance: float, weights: Array) -> tuple
         raise ParameterError(f'rate = {rate!r} 1/s must be positive: the network is not certified '
                              'to synchronise')
     disagreement = disturbance / rate
-    return disagreement, disagreement * _farthest_two(weights)
-
-
-def _farthest_two(weights: Array) -> float:
-    """Largest (1/ξ_i + 1/ξ_j)^½."""
-    return float(np.sqrt(np.sum(1.0 / np.sort(weights)[:2])))
+    return disagreement, disagreement * float(np.sqrt(np.sum(1.0 / np.sort(weights)[:2])))
 
 
 def mismatch_bound(found: Synchronisation, rho: float, radius: float,
@@ -134,11 +129,11 @@ def _bounds(found: Synchronisation, rho: float, radius: float, mismatch: float
         return
     least, smallest = 0.0, float(found.weights.min())
     largest = invariant_radius(radius, found.overshoot, rho)
-    two, one = _farthest_two(found.weights), ((1.0 - smallest) / smallest) ** 0.5
+    one = ((1.0 - smallest) / smallest) ** 0.5
     for _ in range(20):
         growth = min(found.growth, rho * (radius**2 - least**2))
-        epsilon = mismatch * largest / (found.connectivity - growth)
-        distance = epsilon * two
+        epsilon, distance = disagreement_bound(
+            found.connectivity - growth, mismatch * largest, found.weights)
         if not found.free_mean:
             yield MismatchBound(epsilon, distance, 0.0, float(np.pi))
             return

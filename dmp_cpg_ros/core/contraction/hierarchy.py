@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 from dmp_cpg_ros.core.contraction.finding import GRADES, PROVED, weakest
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
@@ -91,33 +92,20 @@ def hierarchy(upper: Part, lower: Part) -> Part:
                 weakest((upper.grade, lower.grade)))
 
 
-def discrete_primitive(reference: Part, canonical: Part, transformation: Part) -> Part:
-    """Theorem 2: a hierarchy of three contracting systems is contracting.
+def primitive(kind: str, reference: Part, canonical: Part, transformations: Sequence[Part]
+              ) -> Part:
+    """Theorems 2 and 3: a reference that drives a canonical system that drives transformation
+    systems is, for a fixed external reference, of the kind of the canonical system.
 
     Raises
     ------
     ParameterError
-        If a part is not of the contracting kind.
+        If the canonical system is not of that kind, or another part is not contracting.
     """
-    for part in (reference, canonical, transformation):
+    for part in (reference, *transformations):
         _require(part, CONTRACTING)
-    return hierarchy(hierarchy(reference, canonical), transformation)
-
-
-def rhythmic_primitive(reference: Part, canonical: Part, transformation: Part) -> Part:
-    """Theorem 3: a transverse contracting canonical system makes the whole so.
-
-    It holds for a fixed external reference.
-
-    Raises
-    ------
-    ParameterError
-        If the canonical system is not of the transverse kind or another part is.
-    """
-    _require(reference, CONTRACTING)
-    _require(canonical, TRANSVERSE)
-    _require(transformation, CONTRACTING)
-    return hierarchy(hierarchy(reference, canonical), transformation)
+    _require(canonical, kind)
+    return reduce(hierarchy, transformations, hierarchy(reference, canonical))
 
 
 def coupled_primitives(reference: Part, oscillator: Part, found: Synchronisation,
@@ -144,14 +132,8 @@ def coupled_primitives(reference: Part, oscillator: Part, found: Synchronisation
     ParameterError
         If a part is of the wrong kind.
     """
-    _require(reference, CONTRACTING)
-    _require(oscillator, TRANSVERSE)
     agreement = Part('synchronisation', CONTRACTING, found.rate)
-    whole = hierarchy(reference, hierarchy(agreement, oscillator))
-    for transformation in transformations:
-        _require(transformation, CONTRACTING)
-        whole = hierarchy(whole, transformation)
-    return whole
+    return primitive(TRANSVERSE, reference, hierarchy(agreement, oscillator), transformations)
 
 
 def _require(part: Part, kind: str) -> None:

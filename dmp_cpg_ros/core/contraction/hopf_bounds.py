@@ -16,9 +16,6 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
-from dmp_cpg_ros.core.contraction.finding import PROVED, Finding
-from dmp_cpg_ros.core.contraction.region import Annulus
 from dmp_cpg_ros.core.maths import Array
 
 
@@ -89,34 +86,28 @@ def largest_shifted(rho: float, radius: float, distance: Array, farthest: float)
     return np.asarray(rho * radius**3 * np.sqrt(4.0 * u**2 - 2.0 * u**2 * d - d**2 + d**3))
 
 
-def transverse_contraction(oscillator: AndronovHopf, omega: float, annulus: Annulus) -> Finding:
-    """Transverse contraction on an annulus under the polar metric M = I/|x|².
+def transverse_rate(rho: float, radius: float, omega: float, inner: float, outer: float) -> float:
+    """Rate of transverse contraction on an annulus under the polar metric M = I/|x|².
 
     In these coordinates F_s = diag(−2ρ|x|², 0) along radius and phase and the flow is
     (ρ(r² − |x|²), ω); the displacement across it shrinks at 2ρ|x|² ω²/(ω² + ρ²(r² − |x|²)²).
 
     Parameters
     ----------
-    oscillator : AndronovHopf
-        Oscillator.
-    omega : float
-        Angular frequency ω > 0 [rad/s].
-    annulus : Annulus
-        Region K; strictly forward invariant when it contains the limit cycle in its inside.
+    rho, radius, omega : float
+        Parameters of the oscillator, ω > 0 [1/s], [-], [rad/s].
+    inner, outer : float
+        Radii of the annulus K; strictly forward invariant when it contains the limit cycle in its
+        inside.
 
     Returns
     -------
-    Finding
-        Grade ``proved``. The rate rises with |x|² up to √(r⁴ + ω²/ρ²) and falls beyond, so that
-        its minimum lies at an end.
+    float
+        The rate rises with |x|² up to √(r⁴ + ω²/ρ²) and falls beyond, so that its minimum lies at
+        an end [1/s].
     """
-    rho, r_squared = float(oscillator.rho), float(oscillator.radius) ** 2
-
     def rate(s: float) -> float:
-        slip = rho * (r_squared - s)
+        slip = rho * (radius**2 - s)
         return 2.0 * rho * s * omega**2 / (omega**2 + slip**2)
 
-    smallest = min(rate(annulus.inner**2), rate(annulus.outer**2))
-    return Finding(smallest, PROVED, 0, (
-        f'for {annulus.inner:g} <= |x| <= {annulus.outer:g} displacements across the flow shrink '
-        f'at {smallest:.6g} 1/s or more under M = I/|x|^2, by a closed form'))
+    return min(rate(inner**2), rate(outer**2))

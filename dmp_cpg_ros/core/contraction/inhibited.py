@@ -25,7 +25,6 @@ from dmp_cpg_ros.core.contraction.synchronisation import (
     grounded_connectivity,
     slowest_rate,
 )
-from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 
 GLOBAL, REGIONAL, NONE = 'global', 'regional', 'none'
@@ -69,32 +68,6 @@ def inhibition_rate(graph: CouplingGraph, gains: Array) -> float:
     It grows with every α_i, and saturates at the grounded Laplacian's smallest eigenvalue.
     """
     return grounded_connectivity(graph, np.asarray(gains, dtype=float))
-
-
-def critical_scaling(beta: float, rate: float) -> float:
-    """α0 = β/2λ2: f1 + α f2 is contracting for every α > α0.
-
-    Parameters
-    ----------
-    beta : float
-        Smallest b with ∂M/∂x·f1 + A1ᵀM + MA1 < bM on the region [1/s]; under the identity metric
-        twice the largest λ_max(A1_s).
-    rate : float
-        λ2 > 0, contraction rate of f2 under M [1/s].
-
-    Returns
-    -------
-    float
-        Never below zero.
-
-    Raises
-    ------
-    ParameterError
-        If f2 is not contracting.
-    """
-    if not rate > 0.0:
-        raise ParameterError(f'rate = {rate!r} 1/s must be positive: f2 is not contracting')
-    return max(0.0, beta / (2.0 * rate))
 
 
 def inhibited_contraction(system: CanonicalSystem, capture: CaptureSet) -> InhibitedContraction:

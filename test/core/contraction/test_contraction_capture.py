@@ -25,12 +25,12 @@ from dmp_cpg_ros.core.contraction.inhibited import (
     GLOBAL,
     NONE,
     REGIONAL,
-    critical_scaling,
     inhibited_contraction,
     inhibition_rate,
 )
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.paper.theorems import critical_scaling
 
 TICK = 0.004
 SEEDS = st.integers(0, 10_000)

@@ -15,12 +15,11 @@ from dmp_cpg_ros.core.contraction.hierarchy import (
     TRANSVERSE,
     Part,
     coupled_primitives,
-    discrete_primitive,
     hierarchy,
-    rhythmic_primitive,
 )
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.paper.theorems import discrete_primitive, rhythmic_primitive
 
 FILTER = Part('filter', CONTRACTING, 3.0)
 CYCLE = Part('cycle', TRANSVERSE, 16.0)

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Regions of the state space on which contraction is tested."""
+"""Regions of the state space on which contraction is tested, and what a test has found."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmp_cpg_ros.core.contraction.capture_anywhere import Interval
+from dmp_cpg_ros.core.contraction.finding import GRADES
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 
@@ -107,3 +108,37 @@ class Box:
 
 
 Region = Ball | Annulus | Box
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Outcome of a contraction test on a region.
+
+    Attributes
+    ----------
+    rate : float
+        λ of the definitions in Section 3.1 [1/s]: distances shrink at least like exp(−λt).
+        Negative where the test found no contraction.
+    grade : str
+        ``proved``, ``continuous`` or ``sampled``.
+    evaluations : int
+        Points (sampled) or boxes (proved) at which the Jacobian was evaluated; 0 for closed forms.
+    statement : str
+        The result in one sentence.
+
+    Raises
+    ------
+    ParameterError
+        If the grade is none of the three.
+    """
+
+    rate: float
+    grade: str
+    evaluations: int
+    statement: str
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        if self.grade not in GRADES:
+            raise ParameterError(f"grade '{self.grade}' is not known; valid are "
+                                 f"{', '.join(GRADES)}")
