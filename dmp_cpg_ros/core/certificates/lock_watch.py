@@ -15,11 +15,12 @@ from __future__ import annotations
 from cmath import phase as angle
 from dataclasses import dataclass
 from itertools import combinations
-from math import asin, exp, inf, pi, sqrt
+from math import exp, inf, pi
 
 import numpy as np
 
 from dmp_cpg_ros.core.certificates.network import EXPECTED_MISMATCH, free_synchronisation
+from dmp_cpg_ros.core.contraction.heterogeneity import disagreement, phase_spread
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.inhibition.entry import locked
 from dmp_cpg_ros.core.maths import Array
@@ -102,14 +103,12 @@ class PhaseLockWatch:
         if p is not self._parameters and p != self._parameters:
             self._found = free_synchronisation(network)  # to which places make no difference
         self._parameters, found = p, self._found
-        z: list[complex] = locked(network, x).tolist()
+        at = locked(network, x)
+        z: list[complex] = at.tolist()
         error = max(abs(angle(one * other.conjugate())) for one, other in combinations(z, 2))
         if found.weights is None or not found.synchronises:
             return PhaseLock(error, pi, LOCKED, inf, places)
-        weights: list[float] = found.weights.tolist()
-        mean = sum(weight * each for weight, each in zip(weights, z, strict=True))
-        epsilon = sqrt(sum(weight * abs(each - mean) ** 2
-                           for weight, each in zip(weights, z, strict=True)))
+        mean, epsilon, pair, single = disagreement(found.weights, at)
         if before is None or not free:
             return PhaseLock(error, pi, LOCKED, epsilon, places)
         size = max(p.radius, *map(abs, z))
@@ -119,9 +118,10 @@ class PhaseLockWatch:
         envelope = max(steady, before.envelope * fade + (1.0 - fade) * steady) + moved
         if before.envelope == inf:
             envelope = max(steady, epsilon)
-        bound = _phase_bound(max(envelope, steady), weights, abs(mean))
-        return _judged(before, PhaseLock(error, bound, LOCKED, envelope, places), epsilon,
-                       _phase_bound(steady, weights, abs(mean)))
+        bound, lasting = (phase_spread(apart * pair, abs(mean) - apart * single)
+                          for apart in (max(envelope, steady), steady))
+        return _judged(
+            before, PhaseLock(error, bound, LOCKED, envelope, places), epsilon, lasting)
 
 
 def _judged(before: PhaseLock, now: PhaseLock, epsilon: float, steady: float) -> PhaseLock:
@@ -141,11 +141,3 @@ def _moved(change: Array) -> float:
         return 0.0
     turned = np.exp(1j * change)
     return float(np.abs(np.angle(turned * np.conj(turned.mean()))).max())
-
-
-def _phase_bound(epsilon: float, weights: list[float], mean_radius: float) -> float:
-    """Largest difference of two phases at a disagreement ε around a mean."""
-    smallest, second = sorted(weights)[:2]
-    inner = mean_radius - epsilon * sqrt((1.0 - smallest) / smallest)
-    half = epsilon * sqrt(1.0 / smallest + 1.0 / second) / (2.0 * inner) if inner > 0.0 else 1.0
-    return 2.0 * asin(half) if half < 1.0 else pi

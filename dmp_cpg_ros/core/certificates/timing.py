@@ -19,12 +19,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.certificates.network import Setting, free_synchronisation
 from dmp_cpg_ros.core.certificates.step import SteppedNetwork
 from dmp_cpg_ros.core.contraction.capture import CaptureSet
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
+from dmp_cpg_ros.core.contraction.heterogeneity import disagreement, phase_spread
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth, largest_radial
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, comparison_laplacian
 from dmp_cpg_ros.core.inhibition import entry, supervisor
@@ -103,7 +103,7 @@ def time_to_walking(s: Setting, found: Synchronisation, rest: InhibitedEquilibri
     if rest is None or not found.synchronises or found.weights is None:
         return math.inf
     z = rest.radius * np.exp(1j * rest.phase_ahead)
-    mean, epsilon, pair, _ = _disagreement(found.weights, z)
+    mean, epsilon, pair, _ = disagreement(found.weights, z)
     inner = float(np.real(z * np.conj(mean)).min()) / max(abs(mean), 1e-300)
     if not inner > 0.0:
         return math.inf
@@ -111,23 +111,12 @@ def time_to_walking(s: Setting, found: Synchronisation, rest: InhibitedEquilibri
     kept, activity = math.exp(-s.parameters.leg.activity_rate * _STEP), 0.0
     for k in range(int(_HORIZON / _STEP)):
         distance = epsilon * pair * math.exp(-found.rate * k * _STEP)
-        spread = math.pi if distance >= 2.0 * inner else 2.0 * math.asin(distance / (2.0 * inner))
-        if spread <= LOCKED_PHASE_ERROR and activity >= supervisor.LOCKED_ACTIVITY:
+        if phase_spread(distance, inner) <= LOCKED_PHASE_ERROR and (
+                activity >= supervisor.LOCKED_ACTIVITY):
             return k * _STEP + DELAY_TICKS * s.tick_s
         wanted = max(0.0, 1.0 - coupling * distance / (inner * s.span.omega[0]))
         activity = wanted + (activity - wanted) * kept
     return math.inf
-
-
-def _disagreement(weights: Array, z: NDArray[np.complex128]
-                  ) -> tuple[complex, float, float, float]:
-    """Mean of locked coordinates and ε = (Σ ξ_i |z_i − z̄|²)^½, with the largest distance of two of
-    them and of one from the mean, as multiples of ε.
-    """
-    mean = complex(weights @ z)
-    smallest, second = np.sort(weights)[:2].tolist()
-    return (mean, math.sqrt(float(weights @ np.abs(z - mean) ** 2)),
-            math.sqrt(1.0 / smallest + 1.0 / second), math.sqrt(1.0 / smallest - 1.0))
 
 
 def time_to_places(s: Setting, x: Array) -> float:
@@ -156,7 +145,7 @@ def time_to_places(s: Setting, x: Array) -> float:
     if entry.in_places(network, x, r0):
         return 0.0
     places, radii = entry.entry_tolerances(network, r0)
-    mean, epsilon, pair, single = _disagreement(found.weights, entry.locked(network, x))
+    mean, epsilon, pair, single = disagreement(found.weights, entry.locked(network, x))
     R, step = abs(mean), min(_STEP, 0.1 / (p.rho * p.radius**2))
     inward = _time_inward(p.rho, p.radius, float(np.hypot(*x.T).max()), p.radius + radii)
     for k in range(round(_HORIZON / _STEP)):

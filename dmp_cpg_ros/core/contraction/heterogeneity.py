@@ -26,8 +26,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from math import asin, pi, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.coupling import CouplingGraph
 from dmp_cpg_ros.core.contraction.synchronisation import (
@@ -87,8 +89,32 @@ def disagreement_bound(rate: float, disturbance: float, weights: Array) -> tuple
     if not rate > 0.0:
         raise ParameterError(f'rate = {rate!r} 1/s must be positive: the network is not certified '
                              'to synchronise')
-    disagreement = disturbance / rate
-    return disagreement, disagreement * float(np.sqrt(np.sum(1.0 / np.sort(weights)[:2])))
+    found = disturbance / rate
+    return found, found * _farthest(weights)[0]
+
+
+def disagreement(weights: Array, z: NDArray[np.complex128]
+                 ) -> tuple[complex, float, float, float]:
+    """Mean of locked coordinates and ε = (Σ ξ_i |z_i − z̄|²)^½, with the largest distance of two of
+    them and of one from the mean, as multiples of ε.
+    """
+    pairs: list[tuple[float, complex]] = list(zip(weights.tolist(), z.tolist(), strict=True))
+    mean = sum(weight * each for weight, each in pairs)
+    return (mean, sqrt(sum(weight * abs(each - mean) ** 2 for weight, each in pairs)),
+            *_farthest(weights))
+
+
+def _farthest(weights: Array) -> tuple[float, float]:
+    smallest, second = sorted(weights.tolist())[:2]
+    return sqrt(1.0 / smallest + 1.0 / second), sqrt((1.0 - smallest) / smallest)
+
+
+def phase_spread(distance: float, inner: float) -> float:
+    """Largest difference of the phases of two states [rad] at a distance, neither of them nearer
+    to the origin than ``inner``.
+    """
+    half = distance / (2.0 * inner) if inner > 0.0 else 1.0
+    return 2.0 * asin(half) if half < 1.0 else pi
 
 
 def mismatch_bound(found: Synchronisation, rho: float, radius: float,
@@ -127,9 +153,8 @@ def _bounds(found: Synchronisation, rho: float, radius: float, mismatch: float
     if not found.synchronises or found.weights is None:
         yield MismatchBound(float('inf'), float('inf'), 0.0, float(np.pi))
         return
-    least, smallest = 0.0, float(found.weights.min())
+    least, (_, one) = 0.0, _farthest(found.weights)
     largest = invariant_radius(radius, found.overshoot, rho)
-    one = ((1.0 - smallest) / smallest) ** 0.5
     for _ in range(20):
         growth = min(found.growth, rho * (radius**2 - least**2))
         epsilon, distance = disagreement_bound(
@@ -140,9 +165,7 @@ def _bounds(found: Synchronisation, rho: float, radius: float, mismatch: float
         farthest = epsilon * one                                             # bounds |x_i − x̄|
         mean = _mean_radius(rho, radius, mismatch, epsilon, farthest)
         inner = max(0.0, mean - farthest)
-        half = distance / (2.0 * inner) if inner > 0.0 else 1.0
-        spread = 2.0 * float(np.arcsin(half)) if half < 1.0 else float(np.pi)
-        yield MismatchBound(epsilon, distance, inner, spread)
+        yield MismatchBound(epsilon, distance, inner, phase_spread(distance, inner))
         if abs(inner - least) < 1e-9:
             return
         least = inner
