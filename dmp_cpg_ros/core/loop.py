@@ -7,9 +7,8 @@ For tuning, tests and studies. In lock-step the nodes publish the same numbers, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,7 +34,6 @@ from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.modes.body_control import BodyControl
 from dmp_cpg_ros.core.modes.leg_control import LegControl
 from dmp_cpg_ros.core.modes.manager import ModeState
-from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.parameters import check_names
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceSystem
 from dmp_cpg_ros.core.reference.governor import Governor
@@ -328,17 +326,3 @@ class WalkingLoop:
     def told_drive(self, drive_mode: str) -> None:
         """Hear what the robot's drives do by themselves, as on the topic ``drive_mode``."""
         self.posture = self.body.told_drive(self.posture, drive_mode)
-
-    @property
-    def takers(self) -> dict[str, Callable[[Any], Any]]:
-        """What takes the events of a scenario, by kind, for
-        :func:`~dmp_cpg_ros.core.scenario.scenario.play`.
-        """
-        return {
-            'command': lambda command: self.command(*command),
-            'inhibit': self.request,
-            'set': self.change,
-            'votes': lambda weights: self.vote(weights, 'scenario'),
-            **{what: partial(lambda what, _: self.request_mode(what), what) for what in REQUESTS},
-            'gait': self.change_gait,
-        }

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import isfinite
 from pathlib import Path
 
@@ -21,7 +20,7 @@ from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.core.robot_model.world import height_over_ground
-from dmp_cpg_ros.core.scenario.push import HOLD_NS, Push, PushForce, PushQueue
+from dmp_cpg_ros.core.scenario.push import HOLD_NS, PushForce, PushQueue
 from dmp_cpg_ros.robot import model_parts
 from dmp_cpg_ros.robot.joint_drive import JointDrive
 from dmp_cpg_ros.robot.model_loader import load_model
@@ -280,17 +279,6 @@ class MujocoRobot:
         DataError as :meth:`~dmp_cpg_ros.core.scenario.push.PushQueue.add`.
         """
         self._pushes.add(force, self._tick * self.tick_ns)
-
-    @property
-    def takers(self) -> dict[str, Callable[[Push], None]]:
-        """What takes the events of a scenario that are for the robot, by kind, for
-        :func:`~dmp_cpg_ros.core.scenario.scenario.play`.
-        """
-        return {'push': self._take_all}
-
-    def _take_all(self, push: Push) -> None:
-        for force in push.forces(self._tick * self.tick_ns, self.tick_ns):
-            self.take_push(force)
 
     def _begin_push(self) -> None:
         """Start the force whose time has come at the beginning of this tick."""

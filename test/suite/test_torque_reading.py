@@ -6,12 +6,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from played_scenario import loop_takers, play, robot_takers
 
 pytest.importorskip('mujoco')
 
 from dmp_cpg_ros.commands.walk import load_scenario
 from dmp_cpg_ros.core.loop import WalkingLoop
-from dmp_cpg_ros.core.scenario.scenario import play
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.suite import load_suite
@@ -27,7 +27,7 @@ def test_the_torque_reading_ambles_and_stops() -> None:
     def step() -> None:
         states.append(robot.step(loop.tick(states[-1]).targets))
 
-    play(scenario, suite.tick_ns, step, {**loop.takers, **robot.takers})
+    play(scenario, suite.tick_ns, step, {**loop_takers(loop), **robot_takers(robot)})
     assert not robot.fallen
     speed = np.array([state.base_velocity_in_base[0] for state in states])
     walking = speed[round(3e9 / suite.tick_ns) : round(8e9 / suite.tick_ns)]

@@ -13,13 +13,13 @@ import pytest
 pytest.importorskip('rclpy')
 
 import ros_processes
+from played_scenario import loop_takers, play, robot_takers
 from ros_processes import RUN_S, SHARED_HZ, Processes
 from walked_feet import Walk
 
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.walk import load_scenario
 from dmp_cpg_ros.core.robot_model.state import RobotState
-from dmp_cpg_ros.core.scenario.scenario import play
 from dmp_cpg_ros.primitive_files import motion_overrides
 
 processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
@@ -61,7 +61,7 @@ def test_a_walk_is_learned_from_its_recording_and_walked_again(
         return loop.state
 
     play(load_scenario(scenario), loop.robot.tick_ns, step,
-         {**loop.loop.takers, **loop.robot.takers})
+         {**loop_takers(loop.loop), **robot_takers(loop.robot)})
     np.testing.assert_array_equal(
         load_recording(tmp_path / 'played' / 'bag').targets.position,
         [tick.targets.position for tick in loop.ticks])

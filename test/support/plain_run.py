@@ -7,10 +7,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from played_scenario import loop_takers, play, robot_takers
+
 from dmp_cpg_ros.commands.walk import load_scenario
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
-from dmp_cpg_ros.core.scenario.scenario import play
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
@@ -40,5 +41,5 @@ def plain_run(scenario_file: Path, **values: Any) -> tuple[list[RobotState], lis
             guard.accept(leg, states[-1].time_ns, targets)
         states.append(robot.step(guard.targets(states[-1])))
 
-    play(scenario, suite.tick_ns, step, {**loop.takers, **getattr(robot, 'takers', {})})
+    play(scenario, suite.tick_ns, step, {**loop_takers(loop), **robot_takers(robot)})
     return states, ticks

@@ -5,11 +5,8 @@
 A scenario is a list of events. A command or a vote holds until the next one and is repeated like a
 joystick does, so that a timeout of cmd_vel can be tried by ``command: silence``.
 
-A new kind of event is one entry in :data:`EVENT_KINDS` here and one in the tables of those who act
-on it: :class:`~dmp_cpg_ros.nodes.scenario_player.ScenarioPlayer` for the nodes, and
-:meth:`~dmp_cpg_ros.core.loop.WalkingLoop.takers` for the plain loop (pushes go to
-:attr:`~dmp_cpg_ros.robot.mujoco_robot.MujocoRobot.takers`, failures to
-:meth:`~dmp_cpg_ros.core.scenario.fault.FaultInjector.add`).
+A new kind of event is one entry in :data:`EVENT_KINDS` here and one in the table of
+:class:`~dmp_cpg_ros.nodes.scenario_player.ScenarioPlayer`, which delivers it.
 """
 
 from __future__ import annotations
@@ -30,8 +27,6 @@ from dmp_cpg_ros.core.suite_parameters import OWNER, SuiteParameters
 
 Command = tuple[float, float, float]
 Read = Callable[[Any, str], tuple[Any, str]]
-Takers = Mapping[str, Callable[[Any], Any]]
-"""Kind of event to the function that takes its value."""
 
 LONGEST_S = 86400.0
 """Latest time in a scenario [s]."""
@@ -292,39 +287,6 @@ class Scenario:
     def ticks(self, tick_ns: int) -> int:
         """Number of control ticks in the scenario."""
         return _tick_after(round(self.duration_s * 1e9), tick_ns) // tick_ns
-
-
-def play(scenario: Scenario, tick_ns: int, step: Callable[[], Any], takers: Takers) -> None:
-    """Play a scenario on the plain loop.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        What happens.
-    tick_ns : int
-        Control tick [ns].
-    step : callable ()
-        Runs one tick of loop and robot.
-    takers : mapping of str to callable (value)
-        Take events of their kind before the tick at which they act, such as
-        :meth:`~dmp_cpg_ros.core.loop.WalkingLoop.takers`.
-
-    Raises
-    ------
-    DataError
-        If the scenario has events of a kind that nobody takes.
-    """
-    actions, place = scenario.timeline(tick_ns), 0
-    missing = {action.kind for action in actions} - set(takers)
-    if missing:
-        raise DataError(
-            f'nobody takes {", ".join(sorted(missing))}; taken are {", ".join(sorted(takers))}')
-    for k in range(scenario.ticks(tick_ns)):
-        while place < len(actions) and actions[place].time_ns <= k * tick_ns:
-            if actions[place].value is not None:
-                takers[actions[place].kind](actions[place].value)
-            place += 1
-        step()
 
 
 def _tick_after(time_ns: int, tick_ns: int) -> int:

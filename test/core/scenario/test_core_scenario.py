@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 from checkout import ROOT
+from played_scenario import play
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.scenario.scenario import COMMAND_PERIOD_NS, EVENT_KINDS, Scenario, play
+from dmp_cpg_ros.core.scenario.scenario import COMMAND_PERIOD_NS, EVENT_KINDS, Scenario
 from dmp_cpg_ros.suite import load_gaits
 
 SCENARIOS = ROOT / 'config' / 'scenarios'

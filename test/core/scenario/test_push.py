@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from played_scenario import play, robot_takers
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import JointTargets
@@ -18,7 +19,7 @@ from dmp_cpg_ros.core.scenario.push import (
     PushForce,
     PushQueue,
 )
-from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS, Scenario, play
+from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS, Scenario
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 
@@ -87,7 +88,7 @@ def flying(scenario, ticks):
         momenta.append(robot.description.mass * robot.data.subtree_linvel[1].copy())
 
     play(Scenario.from_mapping({'duration': ticks * 0.004, 'events': scenario}), TICK_NS, step,
-         robot.takers)
+         robot_takers(robot))
     return np.array(momenta)
 
 
