@@ -90,6 +90,9 @@ for the robot where that is a real one.
 KINDS: dict[str, Kind] = {kind.name: kind for kind in SUITE_TABLE}
 """The table by the name of the kind."""
 
+KIND_OF: dict[str, str] = {name: kind.name for kind in SUITE_TABLE for name in kind.instances}
+"""Kind of every node that there can be, by its name in the graph."""
+
 WALKING: tuple[Kind, ...] = tuple(
     kind for kind in SUITE_TABLE if kind.name not in (RECORDER, VISUALIZATION, DRIVER))
 """Kinds of nodes that walk in simulation: all but those that look on."""

@@ -8,11 +8,12 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from dmp_cpg_ros.commands.fork_server import Forked, ForkServer
 from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.suite_table import COMPOSED, KIND_OF
 
 
 class ProcessGroup:
@@ -46,6 +47,13 @@ class ProcessGroup:
                 self._processes[name] = self._server.start(command, *files)
             except OSError as error:
                 raise DmpCpgError(f'cannot start {name}: {error}') from None
+
+    def start_nodes(self, shared: Mapping[str, Sequence[str]], arguments: Sequence[str]) -> None:
+        """Run every process with its nodes, by their names in the graph."""
+        for process, nodes in shared.items():
+            alone = nodes[0] if len(nodes) == 1 else ''
+            self.start(process, [KIND_OF[alone], *arguments, '-r', f'__node:={alone}'] if alone
+                       else [COMPOSED, *nodes, *arguments])
 
     def restart(self, name: str) -> None:
         """Start a process that has ended once more."""

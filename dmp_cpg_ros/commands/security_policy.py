@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from xml.sax.saxutils import quoteattr
 
 from dmp_cpg_ros.nodes.messages import interfaces
-from dmp_cpg_ros.suite_table import KINDS, RECORDER
+from dmp_cpg_ros.suite_table import KIND_OF, KINDS, RECORDER
 
 ENCLAVE = '/dmp_cpg_ros'
 """Above the enclave of each node."""
@@ -28,9 +28,6 @@ LIFECYCLE_SERVICES = tuple(f'~/{name}' for name in (
     'change_state', 'get_state', 'get_available_states', 'get_available_transitions',
     'get_transition_graph'))
 """Services that rclpy gives to every node, and to every managed one."""
-
-KIND_OF = {name: kind.name for kind in KINDS.values() for name in kind.instances}
-"""Kind of every node that there can be."""
 
 Rules = dict[tuple[str, str], set[str]]
 """Names by verb and kind, such as ``('publish', 'topic')``."""

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import rclpy
@@ -18,7 +18,7 @@ from dmp_cpg_ros.commands.suite_watch import Say, SuiteError, SuiteWatch
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.nodes.framework import execution
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
-from dmp_cpg_ros.suite_table import COMPOSED, PROCESSES, RECORDER, VISUALIZATION, instances
+from dmp_cpg_ros.suite_table import PROCESSES, RECORDER, VISUALIZATION
 
 ENDED_WITHIN_S = 15.0
 """How long a process may take to end before it is killed [s]."""
@@ -85,7 +85,7 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
             if visualization:
                 views.start(VISUALIZATION, [VISUALIZATION, *arguments])
             shared = {RECORDER: (RECORDER,), **PROCESSES[processes]}
-            _start(group, shared, arguments)
+            group.start_nodes(shared, arguments)
             if not respawn:
                 server.close()
             player = ScenarioPlayer(scenario, tick_ns, lock_step, say)
@@ -114,15 +114,3 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
     told = {f'{watch.unrecorded}; the rest of the walk was not recorded': watch.unrecorded,
             f'{player.refused} of {len(scenario.events)} events were refused': player.refused}
     return not watch.unrecorded, [text for text, so in told.items() if so]
-
-
-def _start(group: ProcessGroup, shared: Mapping[str, Sequence[str]], arguments: Sequence[str]
-           ) -> None:
-    """Start every process with its nodes."""
-    kinds = {name: kind.name for kind, name, _ in instances()}
-    for process, nodes in shared.items():
-        if len(nodes) == 1:
-            node = ('-r', f'__node:={nodes[0]}')
-            group.start(process, [kinds[nodes[0]], *arguments, *node])
-        else:
-            group.start(process, [COMPOSED, *nodes, *arguments])

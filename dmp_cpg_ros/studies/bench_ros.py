@@ -34,7 +34,7 @@ from dmp_cpg_ros.studies.bench import parts_of_a_tick, seconds_of, ticks_per_sec
 from dmp_cpg_ros.studies.bench_runs import Run, shared
 from dmp_cpg_ros.studies.judged_changes import judged_changes
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of
-from dmp_cpg_ros.suite_table import RECORDER, namespace_rules
+from dmp_cpg_ros.suite_table import KIND_OF, RECORDER, namespace_rules
 
 SHARING = {'each': 'ten processes', 'blocks': 'blocks', 'composed': 'composed'}
 """What is said of the processes; the recorder has one of its own in each."""
@@ -176,7 +176,7 @@ class Bench:
                              lambda run, of: run.total(of) / run.seconds / run.rate_hz, of)
         for name, nodes in shared(self.ways[0]).items():
             sent, taken = map(sum, zip(*(
-                relays.messages_per_tick(self.known, relays.KIND_OF[node]) for node in nodes),
+                relays.messages_per_tick(self.known, KIND_OF[node]) for node in nodes),
                 strict=True))
             yield figure(f'{name}: takes {taken:.3g}, sends {sent:.3g}', '1/tick',
                          self.runs(self.ways[0]), lambda run, of: (

@@ -34,7 +34,7 @@ from dmp_cpg_ros.nodes.framework import execution
 from dmp_cpg_ros.nodes.framework.health import RobotTiming
 from dmp_cpg_ros.nodes.framework.parameters import BATCH
 from dmp_cpg_ros.nodes.messages import interfaces
-from dmp_cpg_ros.suite_table import KINDS, POSTURE, RECORDED_WALK, RECORDER, ROBOT, instances
+from dmp_cpg_ros.suite_table import KIND_OF, KINDS, POSTURE, RECORDED_WALK, RECORDER, ROBOT
 
 STAMP = struct.Struct('<iI')
 STAMP_AT = 4
@@ -50,8 +50,6 @@ SECOND, LOOK_S = 1_000_000_000, 0.02
 """One second [ns]; how often relays look whether they are connected [s]."""
 
 STEADY = Clock(clock_type=ClockType.STEADY_TIME)
-
-KIND_OF = {name: kind.name for kind, name, _ in instances()}
 
 
 class Sample(NamedTuple):

@@ -48,7 +48,7 @@ from dmp_cpg_ros.studies.lossy_link import Conditions
 from dmp_cpg_ros.studies.network_hosts import TwoHosts
 from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
 from dmp_cpg_ros.suite import load_suite
-from dmp_cpg_ros.suite_table import COMPOSED, PROCESSES, ROBOT, instances
+from dmp_cpg_ros.suite_table import PROCESSES, ROBOT, instances
 
 PEERS = 'ROS_STATIC_PEERS'
 
@@ -213,8 +213,7 @@ def _suite(two: TwoHosts, setting: Setting, folder: Path, peers: bool
             _reach(other.address if peers else '')
             with ForkServer() as server:
                 groups.append(ProcessGroup(folder, server))
-                for name, nodes in processes.items():
-                    groups[-1].start(name, _command(nodes, arguments))
+                groups[-1].start_nodes(processes, arguments)
         yield alive
     finally:
         for group in groups:
@@ -228,13 +227,6 @@ def _reach(peer: str) -> None:
             del os.environ[name]
     os.environ.update({RANGE: 'SUBNET', PEERS: peer})
     prepare_middleware()
-
-
-def _command(nodes: Sequence[str], arguments: Sequence[str]) -> list[str]:
-    if len(nodes) > 1:
-        return [COMPOSED, *nodes, *arguments]
-    kind = next(kind.name for kind, name, _ in instances() if name == nodes[0])
-    return [kind, *arguments, '-r', f'__node:={nodes[0]}']
 
 
 def _without_robot(processes: dict[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
