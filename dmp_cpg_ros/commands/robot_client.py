@@ -10,7 +10,7 @@ import math
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
@@ -185,6 +185,61 @@ def _as_mapping(value: Any) -> Any:
             (value.tolist() if hasattr(value, 'tolist') else value)]
 
 
+_Argument = tuple[tuple[str, ...], dict[str, Any]]
+
+
+def _takes(*flags: str, **how: Any) -> _Argument:
+    return flags, how
+
+
+def _up_to(flag: str, metavar: str, usual: float, text: str) -> _Argument:
+    """A positive number, with what it is without."""
+    return _takes(flag, metavar=metavar, type=positive, default=usual,
+                  help=f'{text} (default: {usual:g})')
+
+
+def _sending(rate_hz: float = 10.0) -> tuple[_Argument, ...]:
+    return (_up_to('--rate', 'HZ', rate_hz, 'commands per second'),
+            _takes('--stamped', action='store_true',
+                   help='send TwistStamped, for a suite with stamped_cmd_vel:=true'))
+
+
+COMMANDS: tuple[tuple[str, Callable[..., None], str, tuple[_Argument, ...]], ...] = (
+    ('cmd_vel', publish_command, 'command a velocity until Ctrl-C', (
+        _takes('v_x', type=number, help='forward [m/s]'),
+        *(_takes(name, type=number, help=f'to the left [{unit}] (default: 0)', default=0.0,
+                 nargs='?') for name, unit in (('v_y', 'm/s'), ('yaw_rate', 'rad/s'))),
+        _takes('--for', metavar='SECONDS', dest='seconds', type=positive, default=math.inf,
+               help='end after so long'), *_sending())),
+    ('inhibit', request, 'stop the gait', ()), ('resume', request, 'start the gait', ()),
+    *((name, request, interface(name).meaning, ()) for name in REQUESTS),
+    ('push', push, 'push the simulated robot for 0.1 s', (
+        _takes('force', metavar='F', type=number, nargs=3, help='forward, to the left, up [N]'),)),
+    ('param', parameter, 'get, set or list parameters of a node', (
+        _takes('action', choices=('get', 'set', 'list'),
+               help='list takes NODE, get NODE NAME, set NODE NAME VALUE'),
+        _takes('node', metavar='NODE', help='such as inhibition; nodes lists them'),
+        _takes('name', metavar='NAME', nargs='?', help='parameter'),
+        _takes('value', metavar='VALUE', nargs='?',
+               help='in YAML, such as trot, 0.5 or [fl, rr]'))),
+    ('nodes', show_nodes, 'list the nodes and what they wait for', ()),
+    ('echo', echo, 'print what is published on a topic', (
+        _takes('topic', metavar='TOPIC', help='such as inhibition_state'),
+        _takes('--once', action='store_true', help='end after the first message'))),
+    ('teleop', drive, 'drive by keyboard', _sending()),
+    ('joystick', steer, 'drive by joystick', (
+        _takes('device', metavar='DEVICE', nargs='?', default='/dev/input/js0',
+               help='of Linux (default: /dev/input/js0)'),
+        _up_to('--top', 'MOST', 0.5, 'with the stick all the way [m/s]'),
+        _up_to('--turn', 'MOST', 0.8, 'with the stick all the way [rad/s]'),
+        _takes('--axes', metavar='N', type=int, nargs=3, default=AXES,
+               help='that go forward, to the left and around (default: 1 0 3)'),
+        _takes('--held', metavar='N', type=int, default=HELD,
+               help='button without which nothing moves; -1: none (default: 4)'),
+        *_sending(20.0))))
+"""Commands: name, what runs, what it does, what it takes."""
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='robot_client',
@@ -195,56 +250,12 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--namespace', metavar='NAME', help="the suite's namespace")
     parser.add_argument('--wait', metavar='SECONDS', type=positive, default=10.0,
                         help='how long to look for the suite (default: 10)')
-    commands = parser.add_subparsers(metavar='COMMAND', dest='command', required=True)
-
-    def command(name: str, run: Any, text: str) -> argparse.ArgumentParser:
-        added = commands.add_parser(name, help=text, description=f'{text[:1].upper()}{text[1:]}.')
-        added.set_defaults(run=run)
-        return added
-
-    def sending(added: argparse.ArgumentParser, rate_hz: float = 10.0) -> None:
-        added.add_argument('--rate', metavar='HZ', type=positive, default=rate_hz,
-                           help=f'commands per second (default: {rate_hz:g})')
-        added.add_argument('--stamped', action='store_true',
-                           help='send TwistStamped, for a suite with stamped_cmd_vel:=true')
-
-    velocity = command('cmd_vel', publish_command, 'command a velocity until Ctrl-C')
-    velocity.add_argument('v_x', type=number, help='forward [m/s]')
-    for name, unit in (('v_y', 'm/s'), ('yaw_rate', 'rad/s')):
-        velocity.add_argument(name, type=number, help=f'to the left [{unit}] (default: 0)',
-                              default=0.0, nargs='?')
-    velocity.add_argument('--for', metavar='SECONDS', dest='seconds', type=positive,
-                          default=math.inf, help='end after so long')
-    sending(velocity)
-    command('inhibit', request, 'stop the gait')
-    command('resume', request, 'start the gait')
-    for name in REQUESTS:
-        command(name, request, interface(name).meaning)
-    pushing = command('push', push, 'push the simulated robot for 0.1 s')
-    pushing.add_argument('force', metavar='F', type=number, nargs=3,
-                         help='forward, to the left, up [N]')
-    parameters = command('param', parameter, 'get, set or list parameters of a node')
-    parameters.add_argument('action', choices=('get', 'set', 'list'),
-                            help='list takes NODE, get NODE NAME, set NODE NAME VALUE')
-    parameters.add_argument('node', metavar='NODE', help='such as inhibition; nodes lists them')
-    for name, text in (('name', 'parameter'), ('value', 'in YAML, such as trot, 0.5 or [fl, rr]')):
-        parameters.add_argument(name, metavar=name.upper(), nargs='?', help=text)
-    command('nodes', show_nodes, 'list the nodes and what they wait for')
-    printing = command('echo', echo, 'print what is published on a topic')
-    printing.add_argument('topic', metavar='TOPIC', help='such as inhibition_state')
-    printing.add_argument('--once', action='store_true', help='end after the first message')
-    sending(command('teleop', drive, 'drive by keyboard'))
-    steering = command('joystick', steer, 'drive by joystick')
-    steering.add_argument('device', metavar='DEVICE', nargs='?', default='/dev/input/js0',
-                          help='of Linux (default: /dev/input/js0)')
-    for name, default, unit in (('--top', 0.5, 'm/s'), ('--turn', 0.8, 'rad/s')):
-        steering.add_argument(name, metavar='MOST', type=positive, default=default,
-                              help=f'with the stick all the way [{unit}] (default: {default:g})')
-    steering.add_argument('--axes', metavar='N', type=int, nargs=3, default=AXES,
-                          help='that go forward, to the left and around (default: 1 0 3)')
-    steering.add_argument('--held', metavar='N', type=int, default=HELD,
-                          help='button without which nothing moves; -1: none (default: 4)')
-    sending(steering, 20.0)
+    added = parser.add_subparsers(metavar='COMMAND', dest='command', required=True)
+    for name, run, text, arguments in COMMANDS:
+        command = added.add_parser(name, help=text, description=f'{text[:1].upper()}{text[1:]}.')
+        command.set_defaults(run=run)
+        for flags, how in arguments:
+            command.add_argument(*flags, **how)
     return parser
 
 
