@@ -13,7 +13,7 @@ from pathlib import Path
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.robot.model_reader import Inspection, inspect_model
+from dmp_cpg_ros.robot.model_inspection import Inspection, inspect_model
 from dmp_cpg_ros.robot.robot_file import find_model
 
 
@@ -63,7 +63,7 @@ def robot_yaml(found: Inspection, folder: Path | None = None, name: str | None =
     Parameters
     ----------
     found : Inspection
-        What :func:`~dmp_cpg_ros.robot.model_reader.inspect_model` returned.
+        What :func:`~dmp_cpg_ros.robot.model_inspection.inspect_model` returned.
     folder : Path, optional
         Where the file will be; the model is then named relative to it when it lies below it.
     name : str, optional

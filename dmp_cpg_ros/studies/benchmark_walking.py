@@ -35,7 +35,7 @@ from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies import benchmark_cases as given
 from dmp_cpg_ros.studies import benchmark_grounds as grounds
-from dmp_cpg_ros.studies import benchmark_pushes, late_walks, output, push_trials
+from dmp_cpg_ros.studies import benchmark_pushes, change_trials, late_walks, output, push_trials
 from dmp_cpg_ros.studies import walking_trials as trials
 from dmp_cpg_ros.studies.loop_recording import StopSummary, suite_of
 from dmp_cpg_ros.studies.study_stops import StopCase, run_trials
@@ -154,9 +154,9 @@ def mismatch(workers: Workers, seeds: int, phases: int) -> Table:
 
 def gaits(workers: Workers, seeds: int, phases: int) -> Table:
     """Every ordered pair of gaits changed while moving, at a quarter of the phases."""
-    walks = run(workers, trials.run_changes, [
+    walks = run(workers, change_trials.run_changes, [
         {'before': before, 'speed': speed, 'phases': max(1, phases // 4)}
-        for before, speed in product(load_gaits(), trials.CHANGE_SPEEDS)])
+        for before, speed in product(load_gaits(), change_trials.CHANGE_SPEEDS)])
     results = [(case, one) for case, of in walks for one in of]
     rows = []
     for before, after in sorted({(case['before'], one.after) for case, one in results}):
@@ -167,7 +167,7 @@ def gaits(workers: Workers, seeds: int, phases: int) -> Table:
                                     ('phase_error', '.1e'), ('sway', '.0f'))]
         rows.append((f'{before} to {after}', str(len(of)), str(len(of) - len(upright)),
                      str(sum(one.in_time for one in upright)), *worst))
-    asked = ' and '.join(map(str, trials.CHANGE_SPEEDS))
+    asked = ' and '.join(map(str, change_trials.CHANGE_SPEEDS))
     return Table(f'Gaits changed while walking, at {asked} m/s',
                  ('change', 'cases', 'fell', 'phase error in bound 3 cycles after', 'longest s',
                   'in cycles', 'largest phase error rad', 'largest roll or pitch deg'),
@@ -181,7 +181,7 @@ def fast_gaits(workers: Workers, seeds: int, phases: int) -> Table:
         most = suite_of(robot=file).parameters.reference.max_speed
         cases += [{'before': before, 'speed': speed, 'phases': max(1, phases // 4), 'robot': file}
                   for before, speed in product(load_gaits(), (most, -most))]
-    walks = run(workers, trials.run_changes, cases)
+    walks = run(workers, change_trials.run_changes, cases)
     results = [(case, one) for case, of in walks for one in of]
     rows = []
     for file in dict.fromkeys(str(case['robot']) for case in cases):
@@ -199,7 +199,7 @@ def fast_gaits(workers: Workers, seeds: int, phases: int) -> Table:
 
 def restarts(workers: Workers, seeds: int, phases: int) -> Table:
     """Posture control that begins anew in the middle of a stride."""
-    walks = run(workers, trials.run_restarts, [
+    walks = run(workers, change_trials.run_restarts, [
         {'gait': gait, 'speed': speed, 'phases': phases} for gait, speed in given.RESTARTED])
     results = [(case, one) for case, of in walks for one in of]
     return Table('Posture control begins anew', (

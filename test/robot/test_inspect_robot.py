@@ -15,7 +15,8 @@ from matplotlib import image
 from dmp_cpg_ros.commands.inspect_robot import main
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.robot.camera import Camera
-from dmp_cpg_ros.robot.model_reader import inspect_model, load_description
+from dmp_cpg_ros.robot.model_inspection import inspect_model
+from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file
 
 ROBOTS = ROOT / 'config' / 'robots'

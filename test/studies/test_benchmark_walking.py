@@ -21,13 +21,12 @@ from dmp_cpg_ros.analysis.recording import WorkSeries
 from dmp_cpg_ros.studies.output import markdown_table
 
 pytest.importorskip('mujoco')
-from dmp_cpg_ros.studies import walking_trials
+from dmp_cpg_ros.studies import change_trials, walking_trials
 from dmp_cpg_ros.studies.benchmark_walking import _largest, main, steady_cells
 from dmp_cpg_ros.studies.loop_recording import recording_of
 from dmp_cpg_ros.studies.push_trials import survives
 from dmp_cpg_ros.studies.trial_tables import Table, tell
 from dmp_cpg_ros.studies.walking_trials import (
-    ChangeOutcome,
     SteadyOutcome,
     Walk,
     cross,
@@ -111,8 +110,8 @@ def test_a_crossing_ends_at_the_finish_or_on_the_ground(monkeypatch: pytest.Monk
 def test_a_change_that_is_not_done_in_time_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     run = Walk('amble')
     assert run.reach((0.4, 0.0, 0.0))
-    monkeypatch.setattr(walking_trials, 'WATCHED', 0.1)
-    outcome = walking_trials._changed(run, ChangeOutcome('trot', 0.0, fell=True))
+    monkeypatch.setattr(change_trials, 'WATCHED', 0.1)
+    outcome = change_trials._changed(run, change_trials.ChangeOutcome('trot', 0.0, fell=True))
     assert not outcome.fell and isnan(outcome.duration) and not outcome.in_time
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from dmp_cpg_ros.core.estimation.mid_stride import steadied
 from dmp_cpg_ros.core.maths import vec3
-from dmp_cpg_ros.studies import walking_trials
-from dmp_cpg_ros.studies.walking_trials import Walk, run_restarts
+from dmp_cpg_ros.studies import change_trials
+from dmp_cpg_ros.studies.walking_trials import Walk
 
 
 @pytest.mark.parametrize(('gait', 'speed'), [('amble', 0.5), ('trot', 2.0), ('pace', 0.5)])
@@ -37,8 +37,8 @@ def test_it_finds_the_body_nearly_level_and_as_fast_as_it_is(gait: str, speed: f
 def test_a_pace_whose_posture_control_begins_anew_walks_on(
         monkeypatch: pytest.MonkeyPatch) -> None:
     """Taken for a robot at rest it fell at most phases."""
-    monkeypatch.setattr(walking_trials, 'WATCHED', 3.0)
-    outcomes = run_restarts('pace', 0.5, 4)
+    monkeypatch.setattr(change_trials, 'WATCHED', 3.0)
+    outcomes = change_trials.run_restarts('pace', 0.5, 4)
     assert len(outcomes) == 4 and not any(one.fell for one in outcomes)
     assert max(one.tilt for one in outcomes) < 10.0
 

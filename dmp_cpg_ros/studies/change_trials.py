@@ -1,0 +1,140 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Trials of changes while walking: of the gait, and of a posture control that begins anew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import deepcopy
+from dataclasses import dataclass, replace
+from math import ceil, isnan, nan
+
+import numpy as np
+
+from dmp_cpg_ros.analysis.motion import tilt
+from dmp_cpg_ros.core.estimation.estimator import estimated_state
+from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
+from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
+from dmp_cpg_ros.studies.walking_trials import Walk, attitude
+from dmp_cpg_ros.suite import load_gaits
+
+CHANGE_SPEEDS = (0.4, 0.6)
+"""Speeds at which gaits change, which every gait can do [m/s]."""
+
+CYCLES_AFTER = 3
+"""Cycles after a transition within which the phase error must be back under its bound."""
+
+WATCHED = 5.0
+"""Time for which the robot is watched after a change was asked for [s]."""
+
+
+@dataclass(frozen=True)
+class ChangeOutcome:
+    """One change.
+
+    Attributes
+    ----------
+    after : str
+        Name of the new gait.
+    phase : float
+        Fraction of a cycle at which it was asked for.
+    fell : bool
+        Whether the robot fell, before or after.
+    duration : float
+        From the request until the new gait is in force [s]; NaN where it was not within
+        ``WATCHED``.
+    cycles : float
+        The same in cycles of the new gait.
+    phase_error : float
+        Largest deviation of a leg from its moving place, from the request on [rad].
+    in_time : bool
+        Whether the error stayed below ``LOCKED_PHASE_ERROR`` from ``CYCLES_AFTER`` cycles after
+        the end on.
+    sway : float
+        Largest roll or pitch from the request on [deg].
+    """
+
+    after: str
+    phase: float
+    fell: bool
+    duration: float = nan
+    cycles: float = nan
+    phase_error: float = nan
+    in_time: bool = False
+    sway: float = nan
+
+
+def run_changes(before: str, speed: float, phases: int, robot: str | None = None
+                ) -> list[ChangeOutcome]:
+    """Walk at a speed [m/s] once, and change to every other gait at some phases, evenly over a
+    cycle, in copies of the walk.
+    """
+    run = Walk(before, robot)
+    return [_changed(deepcopy(run), fell) if upright else fell
+            for phase, upright in _phases(run, speed, phases)
+            for fell in (ChangeOutcome(after, phase, True)
+                         for after in load_gaits() if after != before)]
+
+
+def _phases(run: Walk, speed: float, phases: int) -> Iterator[tuple[float, bool]]:
+    """Walk at a speed [m/s] to some phases, evenly over a cycle; tell at each whether it fell."""
+    upright = run.settle((speed, 0.0, 0.0))
+    step = run.period() / phases
+    for k in range(phases):
+        yield k / phases, upright
+        upright = run.walk(step)
+
+
+def _changed(run: Walk, fell: ChangeOutcome) -> ChangeOutcome:
+    """Outcome of a change that is asked for now."""
+    run.states.clear()
+    reason = run.loop.change_gait(fell.after)
+    if reason:
+        raise RuntimeError(reason)
+    errors, duration = [], nan
+    for k in range(ceil(WATCHED / run.tick_s)):
+        if not run.walk(run.tick_s):
+            return fell
+        network = run.loop.network
+        errors.append(float(np.abs(network.phase_errors(run.loop.x)).max()))
+        if network.gait.name == fell.after and isnan(duration):
+            duration = (k + 1) * run.tick_s
+    period = run.period()
+    settled = [] if isnan(duration) else errors[
+        round((duration + CYCLES_AFTER * period) / run.tick_s):]
+    sway = float(np.abs(np.rad2deg(attitude(run.states)[:, :2])).max())
+    return replace(fell, fell=False, duration=duration, cycles=duration / period,
+                   phase_error=max(errors), sway=sway,
+                   in_time=bool(settled) and max(settled) < LOCKED_PHASE_ERROR)
+
+
+@dataclass(frozen=True)
+class RestartOutcome:
+    """What became of a walk whose posture control began anew: whether it fell, and its largest
+    tilt afterwards [deg].
+    """
+
+    fell: bool
+    tilt: float
+
+
+def run_restarts(gait: str, speed: float, phases: int) -> list[RestartOutcome]:
+    """Walk at a speed [m/s], and let posture control and estimator forget all at some phases,
+    evenly over a cycle, as a node that is started again has.
+    """
+    run = Walk(gait, seed=1)
+    return [_restarted(deepcopy(run)) if upright else RestartOutcome(True, nan)
+            for _, upright in _phases(run, speed, phases)]
+
+
+def _restarted(run: Walk) -> RestartOutcome:
+    loop = run.loop
+    run.states.clear()
+    if loop.estimator is None:
+        raise RuntimeError('state_source must be estimate')
+    loop.estimator_state, estimate = loop.estimator.step(None, readings_of(run.state))
+    loop.posture = loop.body.picked_up(
+        loop.body.initial_state(), estimated_state(readings_of(run.state), estimate))
+    upright = run.walk(WATCHED)
+    return RestartOutcome(not upright, float(np.rad2deg(tilt(
+        np.array([state.base_quaternion for state in run.states])).max())))
