@@ -24,15 +24,12 @@ from pathlib import Path
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.process_usage import children
-from dmp_cpg_ros.studies.walk_process import WalkProcess, ahead
+from dmp_cpg_ros.studies.walk_process import WITHIN_S, WalkProcess, ahead
 
 FOLDER = Path('/dev/shm')
 
 LATEST_S = 6.0
 """Latest moment of a kill, from the first process on [s]."""
-
-PATIENCE_S = 120.0
-"""How long a suite may take to have its first process, and to go to its end [s]."""
 
 
 def files() -> dict[str, int]:
@@ -48,7 +45,7 @@ def killed(rng: random.Random) -> int:
     """Start a suite and kill it; returns how many processes that were."""
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         walk = WalkProcess.of(Path(folder), 3600.0, ahead())
-        deadline = time.monotonic() + PATIENCE_S
+        deadline = time.monotonic() + WITHIN_S
         while not children(walk.process.pid) and time.monotonic() < deadline:
             if walk.process.poll() is not None:
                 return 0
@@ -81,7 +78,7 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
         print(f'\r{number + 1}/{options.starts} ', end='', file=sys.stderr, flush=True)
     with tempfile.TemporaryDirectory() as folder:
         walk = WalkProcess.of(Path(folder), 8.0, ahead())
-        status = walk.process.wait(PATIENCE_S)
+        status = walk.process.wait(WITHIN_S)
     after = files().keys() - before
     print('\n' + markdown_table(
         ('starts', 'processes killed', 'at one time, MB', 'files left in the end', 'last walk'),

@@ -25,7 +25,7 @@ from dmp_cpg_ros.commands.ros_arguments import RosArguments, positive, run_comma
 from dmp_cpg_ros.studies.bench_runs import shared
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.process_usage import private_mb
-from dmp_cpg_ros.studies.walk_process import WalkProcess
+from dmp_cpg_ros.studies.walk_process import WITHIN_S, WalkProcess
 
 MINUTE = 60.0
 """Of the robot's clock [s]."""
@@ -33,9 +33,6 @@ MINUTE = 60.0
 LAST_LINES = 10
 
 GAITS = ('amble', 'trot', 'walk')
-
-PATIENCE_S = 120.0
-"""How long the walk may take to end after the first of its processes has [s]."""
 
 
 def events(minutes: int) -> Iterator[dict[str, object]]:
@@ -76,7 +73,7 @@ def measure(walk: WalkProcess, every_s: float) -> dict[str, list[float]]:
             found = {name: private_mb(pid) for name, pid in pids.items()}
         except OSError:  # one has ended, and so will the walk
             with suppress(subprocess.TimeoutExpired):
-                walk.process.wait(PATIENCE_S)
+                walk.process.wait(WITHIN_S)
             break
         for name, memory_mb in found.items():
             read[name].append(memory_mb)

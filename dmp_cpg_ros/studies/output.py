@@ -6,7 +6,11 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from dmp_cpg_ros.analysis.strict_json import write_json
@@ -26,10 +30,10 @@ def at_least_one(text: str) -> int:
     return number
 
 
-def parser_of(name: str, description: str | None, written: str, *, jobs: bool = True
-              ) -> argparse.ArgumentParser:
-    """Parser with the options ``--json``, for what is written, and those of
-    :class:`~dmp_cpg_ros.studies.workers.Workers`.
+def parser_of(name: str, description: str | None, written: str, *, jobs: bool = True,
+              logs: bool = False) -> argparse.ArgumentParser:
+    """Parser with the options ``--json``, for what is written, those of
+    :class:`~dmp_cpg_ros.studies.workers.Workers`, and that of :func:`folder_of_logs`.
     """
     parser = argparse.ArgumentParser(prog=name, description=(description or '').replace('``', ''),
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -41,8 +45,24 @@ def parser_of(name: str, description: str | None, written: str, *, jobs: bool = 
             '--cluster', default='', metavar='ADDRESS',
             help='of the scheduler of a dask.distributed cluster, such as tcp://HOST:8786, whose '
             "workers have this package; needs pip install 'dmp_cpg_ros[cluster]'")
+    if logs:
+        parser.add_argument('--logs', type=Path, metavar='FOLDER',
+                            help='where to keep what the processes say')
     parser.add_argument('--json', type=Path, metavar='FILE', help=f'write {written}')
     return parser
+
+
+@contextmanager
+def folder_of_logs(kept: Path | None) -> Iterator[Path]:
+    """A folder for processes, which keeps what they say where that is wanted."""
+    with TemporaryDirectory() as folder:
+        try:
+            yield Path(folder)
+        finally:
+            if kept is not None:
+                kept.mkdir(parents=True, exist_ok=True)
+                for log in (*Path(folder).rglob('*.log'), *Path(folder).glob('said.txt')):
+                    shutil.copy(log, kept)
 
 
 def write_results(file: Path | None, results: Any) -> None:

@@ -16,15 +16,12 @@ import argparse
 import json
 import os
 import random
-import re
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from itertools import cycle, islice
 from math import inf, nan
@@ -39,7 +36,7 @@ from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.studies.link_watch import FALLEN_TILT, posture
-from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
+from dmp_cpg_ros.studies.output import folder_of_logs, markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.walk_process import WITHIN_S, WalkProcess, ahead
 from dmp_cpg_ros.suite import load_gaits
 from dmp_cpg_ros.suite_table import RECORDER, ROBOT, WALKING_NODES
@@ -142,8 +139,7 @@ def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence
         kill.time_s = walk.said(f'{node} was ended', begin)
         ready = walk.said(READY, begin)
         walks = ready < inf and (lock_step or node == RECORDER or walk.walks())
-        told = [re.search(rf'^ *([\d.]+) s .*{FOLLOWS}', line) for line in walk.lines[begin:]]
-        follows = [float(found[1]) for found in told if found]
+        follows = walk.told(FOLLOWS, begin)
         kill.back_s, kill.follows_s = min([ready, *follows]), max(follows, default=-inf)
         if not walks:
             break
@@ -243,7 +239,8 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
                         wanted = list(islice(cycle(nodes), options.kills))
                     else:
                         wanted = [rng.choice(nodes)]
-                    with _folder(options.logs, f'{len(outcomes):03}_{gait}') as folder:
+                    with folder_of_logs(options.logs and (
+                            options.logs / f'{len(outcomes):03}_{gait}')) as folder:
                         outcomes.append(run(gait, speed, lock_step, respawn, wanted, rng, folder))
                     print(f'round {round_}: {json.dumps(asdict(outcomes[-1]))}', flush=True)
                     write_results(options.json, [asdict(one) for one in outcomes])
@@ -251,23 +248,8 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
     return int(any(one.fell for one in outcomes))
 
 
-@contextmanager
-def _folder(logs: Path | None, name: str) -> Iterator[Path]:
-    """A folder for a walk, which keeps what its processes said where logs are wanted."""
-    with tempfile.TemporaryDirectory() as folder:
-        try:
-            yield Path(folder)
-        finally:
-            if logs is not None:
-                kept = logs / name
-                kept.mkdir(parents=True, exist_ok=True)
-                for log in (Path(folder) / 'said.txt', *Path(folder).glob('run/logs/*.log')):
-                    if log.is_file():
-                        shutil.copy(log, kept)
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = parser_of('study_faults', __doc__, 'every walk', jobs=False)
+    parser = parser_of('study_faults', __doc__, 'every walk', jobs=False, logs=True)
     add = parser.add_argument
     add('--rounds', type=int, default=5, help='times through all ways to walk (default: 5)')
     add('--kills', type=int, default=16, help='kills in a walk with --respawn (default: 16)')
@@ -276,7 +258,6 @@ def _parser() -> argparse.ArgumentParser:
     add('--nodes', nargs='+', choices=(*VICTIMS, RECORDER), default=VICTIMS,
         metavar='NODE', help=f'that are killed: {RECORDER}, or (default: all of them) '
         f'{", ".join(VICTIMS)}')
-    add('--logs', type=Path, metavar='FOLDER', help='where to keep what the processes say')
     add('--seed', type=int, default=0, help='of nodes and times (default: 0)')
     return parser
 

@@ -16,7 +16,6 @@ import argparse
 import json
 import os
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -46,7 +45,7 @@ from dmp_cpg_ros.nodes.framework.parameters import BEST_EFFORT, DELIVERIES
 from dmp_cpg_ros.studies.link_watch import FALLEN_TILT, LinkWatch
 from dmp_cpg_ros.studies.lossy_link import Conditions
 from dmp_cpg_ros.studies.network_hosts import TwoHosts
-from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
+from dmp_cpg_ros.studies.output import folder_of_logs, markdown_table, parser_of, write_results
 from dmp_cpg_ros.suite import load_suite
 from dmp_cpg_ros.suite_table import PROCESSES, ROBOT, instances
 
@@ -249,14 +248,8 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
     lead_ms = lead_for(first) if options.lead_ms is None else options.lead_ms
     setting = Setting(options.gait, options.speed, options.seconds, lead_ms, options.processes,
                       options.delivery, tuple(ros.parameters.items()))
-    with tempfile.TemporaryDirectory() as folder, TwoHosts(first, options.seed) as two:
-        try:
-            phases, said = walk(two, setting, links, Path(folder), peers=options.peers)
-        finally:
-            if options.logs:
-                options.logs.mkdir(parents=True, exist_ok=True)
-                for log in Path(folder).glob('*.log'):
-                    (options.logs / log.name).write_bytes(log.read_bytes())
+    with folder_of_logs(options.logs) as folder, TwoHosts(first, options.seed) as two:
+        phases, said = walk(two, setting, links, folder, peers=options.peers)
         carried = two.end_link()
     for seconds, text in said:
         print(f'{seconds:8.3f} s  {text}')
@@ -276,7 +269,7 @@ def _row(setting: Setting, phase: Phase) -> tuple[str, ...]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = parser_of('two_hosts', __doc__, 'what happened', jobs=False)
+    parser = parser_of('two_hosts', __doc__, 'what happened', jobs=False, logs=True)
     for name, kind, default, text in (
             ('delay-ms', float, 5.0, 'delay of the link each way'),
             ('jitter-ms', float, 2.0, 'by how much it varies to either side, uniform'),
@@ -298,8 +291,6 @@ def _parser() -> argparse.ArgumentParser:
                         help='no multicast crosses the link; the hosts name each other as '
                         'ROS_STATIC_PEERS')
     parser.add_argument('--seed', type=int, default=0, help="of the link's draws (default: 0)")
-    parser.add_argument('--logs', type=Path, metavar='FOLDER',
-                        help='where to keep what the processes say')
     return parser
 
 

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -80,25 +80,32 @@ class WalkProcess:
             self.times.append(time.monotonic())
             self.lines.append(line)
 
-    def said(self, pattern: str, begin: int = 0) -> float:
-        """Wait for a line that ends like that; its time [s], infinite when it does not come."""
+    def _wait(self, done: Callable[[], bool]) -> bool:
+        """Wait until something is so, or the walk has ended, or for too long; whether it is so."""
         deadline = time.monotonic() + WITHIN_S
         while time.monotonic() < deadline and self.process.poll() is None:
-            for line in self.lines[begin:]:
-                if found := re.search(rf'^ *([\d.]+) s .*{pattern}', line):
-                    return float(found[1])
-            time.sleep(0.05)
-        return inf
-
-    def walks(self) -> bool:
-        """Wait until its last words of the gait are that it walks; whether they are."""
-        deadline = time.monotonic() + WITHIN_S
-        while time.monotonic() < deadline and self.process.poll() is None:
-            states = (re.search(GAIT_STATE, line) for line in reversed(self.lines))
-            if (last := next(filter(None, states), None)) and last[1] == 'walking':
+            if done():
                 return True
             time.sleep(0.05)
         return False
+
+    def told(self, pattern: str, begin: int = 0) -> list[float]:
+        """Times of the lines that end like that [s]."""
+        found = (re.search(rf'^ *([\d.]+) s .*{pattern}', line) for line in self.lines[begin:])
+        return [float(line[1]) for line in found if line]
+
+    def said(self, pattern: str, begin: int = 0) -> float:
+        """Wait for a line that ends like that; its time [s], infinite when it does not come."""
+        return self.told(pattern, begin)[0] if self._wait(
+            lambda: bool(self.told(pattern, begin))) else inf
+
+    def walks(self) -> bool:
+        """Wait until its last words of the gait are that it walks; whether they are."""
+        def walking() -> bool:
+            states = [found[1] for line in self.lines if (found := re.search(GAIT_STATE, line))]
+            return states[-1:] == ['walking']
+
+        return self._wait(walking)
 
     def must_walk(self) -> None:
         """Raise :meth:`failure` where it does not walk."""
