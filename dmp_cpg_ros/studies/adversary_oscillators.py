@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, topology
+from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
@@ -133,8 +133,7 @@ def judge_anywhere(_: RobotDescription, case: Case, weaken: bool) -> Judged:
     """
     size, r0, rng = case['size'], case['region_radius'], np.random.default_rng(case['seed'])
     edges = topology(case['graph'], size)
-    graph = CouplingGraph(size, edges, np.array([case['coupling'] * np.eye(2)] * len(edges)),
-                          np.zeros(size))
+    graph = graph_from_edges(size, edges, case['coupling'])
     system = CanonicalSystem(graph, AndronovHopf(case['rho'], 1.0), state_at(np.zeros(size), 1.0))
     gains = np.zeros(size)
     gains[0] = case['room'] * needed_gain_anywhere(system, case['omega'], 0, r0)

@@ -113,8 +113,7 @@ def random_setting(rng: np.random.Generator) -> Setting:
                     'cascade': ((0, 1), (1, 0), (2, int(rng.integers(2))), (2, 3), (3, 2))}.get(
                         graph) or topology(graph, len(LEGS))
     weights = gain * np.exp(rng.uniform(-0.7, 0.7, len(edges)) * rng.integers(2))
-    _couple(network, CouplingGraph(len(LEGS), edges, weights[:, None, None] * np.eye(2),
-                                   network.gait.phases))
+    _couple(network, graph_from_edges(len(LEGS), edges, weights, network.gait.phases))
     reference = ReferenceParameters(max_speed=some(0.1, 2.0), alpha_r=some(1.0, 30.0))
     legs = tuple(LEGS[leg] for leg in rng.permutation(len(LEGS))[:rng.integers(1, 5)])
     region = radius * some(0.05, 1.0)

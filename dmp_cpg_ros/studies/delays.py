@@ -130,7 +130,7 @@ def random_captures(rng: np.random.Generator, count: int, most: int = 8
         size = int(rng.integers(2, most + 1))
         edges = both_ways(random_edges(size, rng))
         weights = np.exp(rng.uniform(np.log(20.0), np.log(200.0), len(edges)))
-        graph = CouplingGraph(size, edges, weights[:, None, None] * np.eye(2), np.zeros(size))
+        graph = graph_from_edges(size, edges, weights)
         rho, omega = np.exp(rng.uniform(np.log([0.5, 2.0]), np.log([20.0, 20.0])))
         region, room = rng.uniform(0.15, 0.8), 1.0 + 10.0 ** rng.uniform(-2.0, 0.5)
         held = tuple(rng.choice(size, 1 + int(size > 2 and rng.random() < 0.3), replace=False))

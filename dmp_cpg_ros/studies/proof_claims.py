@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.coupling import CouplingGraph
+from dmp_cpg_ros.core.canonical.coupling import graph_from_edges
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates import step
@@ -65,8 +65,8 @@ class _Claimed:
                        for plane in w['half_planes']]
         size, K = len(self.K), self.K
         self.oscillator = AndronovHopf(self.rho, self.r)
-        self.graph = CouplingGraph(size, tuple((int(i), int(j)) for i, j in np.argwhere(K > 0.0)),
-                                   K[K > 0.0][:, None, None] * np.eye(2), np.zeros(size))
+        self.graph = graph_from_edges(
+            size, tuple((int(i), int(j)) for i, j in np.argwhere(K > 0.0)), K[K > 0.0])
         self.system = CanonicalSystem(self.graph, self.oscillator)
         self.target, self.held = np.array([self.r, 0.0]), self.gains > 0.0
         self.growth, self.kept = self.rho * self.r**2, self.gains + K.sum(axis=1)

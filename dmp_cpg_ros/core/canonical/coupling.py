@@ -68,6 +68,12 @@ class CouplingGraph:
                     f'gain of edge {edge} must have a positive definite symmetric part; '
                     f'its smallest eigenvalue is {smallest:.4g}')
 
+    @property
+    def weights(self) -> Array | None:
+        """k_ij of each edge, ndarray (E,) [1/s]; None where not every K_ij is k_ij I."""
+        k = self.gains[:, 0, 0]
+        return k if np.array_equal(self.gains, k[:, None, None] * np.eye(2)) else None
+
     def coupling_matrix(self) -> Array:
         """Matrix −L with ẋ = … − L x in the original coordinates (offsets included).
 
@@ -122,7 +128,7 @@ class CouplingGraph:
 
 def graph_from_edges(size: int, edges: Edges, gain: float | Array,
                      phases: Array | None = None) -> CouplingGraph:
-    """Graph in which every edge has the same gain.
+    """Graph in which every edge has the same gain, or every edge a weight.
 
     Parameters
     ----------
@@ -130,8 +136,8 @@ def graph_from_edges(size: int, edges: Edges, gain: float | Array,
         Number of oscillators.
     edges : tuple of (int, int)
         Directed edges (i, j): j acts on i.
-    gain : float or ndarray (2, 2)
-        k for K = k I, or K [1/s].
+    gain : float, ndarray (E,) or ndarray (2, 2)
+        k for K = k I, of all edges or of each, or K of all [1/s].
     phases : ndarray (N,), optional
         Locked phases [rad]; zeros without.
 
@@ -139,7 +145,8 @@ def graph_from_edges(size: int, edges: Edges, gain: float | Array,
     -------
     CouplingGraph
     """
-    K = gain * np.eye(2) if np.ndim(gain) == 0 else np.asarray(gain, dtype=float)
+    K = np.asarray(gain, dtype=float)
+    K = K if K.ndim == 2 else K[..., None, None] * np.eye(2)
     gains = np.broadcast_to(K, (len(edges), 2, 2)).copy()
     return CouplingGraph(
         size, edges, gains, np.zeros(size) if phases is None else np.asarray(phases, float))

@@ -84,11 +84,11 @@ def _parameters(s: Setting, analysis: NetworkAnalysis) -> Values:
     """Numbers that the suite runs with, as the fractions that they are."""
     oscillators, span, leg = s.network.parameters, s.span, s.parameters.leg
     graph = s.network.system.graph
-    coupling = np.zeros((graph.size, graph.size))
-    for (i, j), gain in zip(graph.edges, graph.gains, strict=True):
-        coupling[i, j] = gain[0, 0]
-    if not np.array_equal(graph.gains, graph.gains[:, :1, :1] * np.eye(2)):
+    coupling, weights = np.zeros((graph.size, graph.size)), graph.weights
+    if weights is None:
         raise ParameterError('no exact proof is known for couplings other than k_ij I')
+    for (i, j), k in zip(graph.edges, weights, strict=True):
+        coupling[i, j] = k
     values = {
         'rho': oscillators.rho, 'radius': oscillators.radius,
         'region_radius': s.parameters.inhibition.region_radius, 'tick': s.tick_s,

@@ -273,9 +273,15 @@ def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed
     """Time from any state in the capture set to the thresholds of rest [s]."""
     r, span, N = s.network.parameters.radius, s.span, len(capture.distance)
     alpha_r, a_b = s.parameters.reference.alpha_r, s.parameters.reference.braking
-    # |∂f/∂ω| |ω̇| at first: sideways and turning count twice in the speed that sets the cadence
-    turning = span.omega_slope * max(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r
-    away = span.omega_slope * speed * r                      # |∂f/∂ω| |ω − ω_rest| at first
+
+    def drive(speed: float) -> tuple[float, float]:
+        """|∂f/∂ω| |ω̇| and |∂f/∂ω| |ω − ω_rest|: sideways and turning count twice in the speed
+        that sets the cadence.
+        """
+        return (span.omega_slope * max(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r,
+                span.omega_slope * speed * r)
+
+    turning, away = drive(speed)
     of = _falling(s, capture, turning, away) if step is None else _falling_in_steps(
         s, capture, step)
     fade, cells = math.exp(-alpha_r * of.cell), int(_HORIZON / of.cell)
@@ -291,8 +297,7 @@ def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed
             driven += [turning, away]
             if a_b > 0.0:
                 speed = max(0.0, min(speed * fade, speed - a_b * of.cell))
-                turning = span.omega_slope * max(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r
-                away = span.omega_slope * speed * r
+                turning, away = drive(speed)
             else:
                 speed, turning, away = speed * fade, turning * fade, away * fade
         within = (carried @ bounds + fed @ np.array(driven)).reshape(_BLOCK + 1, -1)

@@ -191,9 +191,8 @@ def mismatch_margin(graph: CouplingGraph, found: Synchronisation, rho: float, ra
     float
         δ with |ω_i − ω| ≤ δ [rad/s]; 0 when nothing is certified.
     """
-    L, gain = comparison_laplacian(graph), None
-    if np.array_equal(graph.gains, graph.gains[:, :1, :1] * np.eye(2)):
-        gain = phase_gain(L)
+    L = comparison_laplacian(graph)
+    gain = None if graph.weights is None else phase_gain(L)
 
     def within(delta: float) -> bool:
         for bound in _bounds(found, rho, radius, delta):
