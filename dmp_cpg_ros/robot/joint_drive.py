@@ -46,6 +46,8 @@ class JointDrive:
         self._limit = np.concatenate([leg.torque_limit for leg in description.legs])
         speed = np.concatenate([leg.velocity_limit for leg in description.legs])
         self._unlimited = 0.999 * ROLL_OFF_FROM * speed  # below this rounding decides nothing
+        self._slow, self._weak = (0.999 * float(limit.min()) ** 2
+                                  for limit in (self._unlimited, self._limit))
         self._slope = self._limit / (speed * (1.0 - ROLL_OFF_FROM))  # [N m s/rad]
         self._stall = self._limit / (1.0 - ROLL_OFF_FROM)  # the falling line at zero speed
         self._forward = self._kd + (self._kp > 0.0) * np.asarray(damping, dtype=float)
@@ -107,19 +109,28 @@ class JointDrive:
             self._command[step] - self._kp * position - self._kd * velocity, velocity)
 
     def limited(self, torque: Array, velocity: Array) -> Array:
-        """Clip torques (12,) to what the actuators can give at these speeds.
+        """Clip torques (..., 12) to what the actuators can give at these speeds.
 
         Torque along the motion is limited to τ_max up to 0.7 of the speed limit and falls linearly
         to zero at the speed limit; torque against the motion is limited to τ_max only.
         """
-        if (np.count_nonzero(np.abs(velocity) <= self._unlimited) == velocity.size
-                and np.count_nonzero(np.abs(torque) <= self._limit) == torque.size):
-            return torque  # the usual case, at half of the general price
+        if (_within(velocity, self._unlimited, self._slow)
+                and _within(torque, self._limit, self._weak)):
+            return torque  # as nearly always
         lost = self._slope * velocity
         upper = np.minimum(self._limit, np.maximum(self._stall - lost, self._nothing))
         lower = np.minimum(self._limit, np.maximum(self._stall + lost, self._nothing))
         clipped: Array = np.minimum(upper, np.maximum(-lower, torque))
         return clipped
+
+
+def _within(values: Array, limits: Array, smallest_squared: float) -> bool:
+    """Whether no value is beyond its limit, as is certain where their length is not even beyond
+    the smallest.
+    """
+    numbers = values.ravel()
+    return bool(numbers.dot(numbers) <= smallest_squared
+                or np.count_nonzero(np.abs(values) <= limits) == values.size)
 
 
 def checked_targets(targets: JointTargets) -> Array:
