@@ -252,12 +252,11 @@ class MujocoRobot:
 
     def _mean_specific_force(self) -> Array:
         """What an accelerometer in the base felt in the mean over the tick, (3,) [m/s^2]."""
-        d, total = self._ids.base_dof, np.zeros(3)
+        d = self._ids.base_dof
         velocity = self._velocities[:, d:d + 3]
         felt = (velocity[1:] - velocity[:-1]) / self._step_s - self._gravity
-        for force, R_world_base in zip(felt, self._rotations, strict=True):
-            total += force.dot(R_world_base)  # at a seventh of the price of @
-        return total / self._steps
+        in_base = felt[:, None, :] @ self._rotations  # (steps, 1, 3)
+        return np.asarray(in_base.sum(axis=0)[0] / self._steps)
 
     def apply_push(self, force_in_world: Array, duration_ns: int) -> None:
         """Push the base's centre of mass with a force [N] from now on, for whole physics steps.
