@@ -90,9 +90,8 @@ class AndronovHopf:
         if x.dtype.kind == 'c':  # a step of a derivative: x₁ and x₂ are no parts of one number
             turning = np.asarray(omega)[..., None] * (x @ phase_generator().T)
             return np.asarray(turning + (at_origin - damping)[..., None] * x)
-        z = np.ascontiguousarray(x).view(complex)[..., 0]
-        rate = (at_origin - 1j * omega - damping) * z
-        return rate.ravel().view(float).reshape(x.shape)
+        growth = np.asarray(at_origin - 1j * omega - damping)
+        return (growth[..., None] * np.ascontiguousarray(x).view(complex)).view(float)
 
     def jacobian(self, x: Array, omega: float | Array) -> Array:
         """Jacobian A = ∂f/∂x = ω S + ρ (r² − |x|²) I − 2ρ x xᵀ.
