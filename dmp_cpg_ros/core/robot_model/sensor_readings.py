@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import isnan
+
+import numpy as np
 
 from dmp_cpg_ros.core.robot_model.state import LEGS, Array, RobotState
 
@@ -53,22 +54,21 @@ class SensorReadings:
 
     def __post_init__(self) -> None:
         """Judge the readings, once for all who ask."""
-        q, q_dot, legs = self.joint_position.tolist(), self.joint_velocity.tolist(), ALL
-        if not _within(q + q_dot, FASTEST_JOINT):
-            legs = tuple(
-                _within(q[i:i + 3] + q_dot[i:i + 3], FASTEST_JOINT) for i in range(0, 12, 3))
-        forces, contacts = self.foot_force.tolist(), ALL
-        if not _within(forces, LARGEST_FORCE):
-            contacts = tuple(abs(force) <= LARGEST_FORCE for force in forces)
+        q, q_dot, legs, contacts = self.joint_position, self.joint_velocity, ALL, ALL
+        if not (_within(q, FASTEST_JOINT) and _within(q_dot, FASTEST_JOINT)):
+            legs = tuple(_within(q[i:i + 3], FASTEST_JOINT) and _within(
+                q_dot[i:i + 3], FASTEST_JOINT) for i in range(0, 12, 3))
+        if not _within(self.foot_force, LARGEST_FORCE):
+            contacts = tuple(abs(force) <= LARGEST_FORCE for force in self.foot_force.tolist())
         vars(self).update(
-            imu_is_usable=_within(self.rate_in_base.tolist(), FASTEST_TURN) and _within(
-                self.specific_force_in_base.tolist(), HARDEST_BLOW),
+            imu_is_usable=_within(self.rate_in_base, FASTEST_TURN) and _within(
+                self.specific_force_in_base, HARDEST_BLOW),
             usable_legs=legs, usable_contacts=contacts)
 
 
-def _within(values: list[float], limit: float) -> bool:
-    """Whether no value is beyond a limit, and none is NaN, which makes the sum NaN."""
-    return max(values) <= limit and min(values) >= -limit and not isnan(sum(values))
+def _within(values: Array, limit: float) -> bool:
+    """Whether no value is beyond a limit, and none is NaN: certain where their length is not."""
+    return bool(values.dot(values) <= 0.999 * limit * limit or np.abs(values).max() <= limit)
 
 
 def readings_of(state: RobotState) -> SensorReadings:
