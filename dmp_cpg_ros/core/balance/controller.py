@@ -33,7 +33,7 @@ from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
 from dmp_cpg_ros.core.gait.contact_feedback import LOADED, believed, quarter_weight
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.blocked import Progress
-from dmp_cpg_ros.core.maths import Array, vec3
+from dmp_cpg_ros.core.maths import Array, clamped, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Pair, Triple
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -160,7 +160,8 @@ class PostureController:
         self.foot_radius = float(np.mean([leg.foot_radius for leg in description.legs]))
         self._touch_force = LOADED * quarter_weight(description)
         self._com_in_base = vec3.triple(description.com_in_base.tolist())
-        self._torque_limit = np.concatenate([leg.torque_limit for leg in description.legs])
+        self._torque_limit = [
+            float(most) for leg in description.legs for most in leg.torque_limit]
         inertia = description.base_inertia.diagonal()
         # moments count as the accelerations that they cause at the length of a leg
         importance = description.mass * self.scale.leg_length / inertia
@@ -245,8 +246,9 @@ class PostureController:
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(gait, positions, duty, omega, moving)
         acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
+        foot_force = believed(state.foot_force)
         terrain, level = self._ground(
-            memory.terrain, state, R_ground_base[2], [foot for foot, _ in legs],
+            memory.terrain, state, foot_force, R_ground_base[2], [foot for foot, _ in legs],
             [position / (1.0 - duty) + 0.5 for position in positions], gait, (reference, measured)
         ) if p.climbing else (NOTHING_FELT, LEVEL_FEET)
         return PostureState(activity, integral, plan, offset, terrain), PostureFeedback(
@@ -256,7 +258,7 @@ class PostureController:
             np.array(self.placement.drift(
                 self.placement.yielding(p, reference[0], gait.firm), measured, planned, swings,
                 sway.velocity)),
-            np.array(correction), command, state.joint_position, believed(state.foot_force),
+            np.array(correction), command, state.joint_position, foot_force,
             self._margins(R_ground_base, feet, swings, (lean_x, lean_y), (
                 measured[0] - (planned[0] - lasting[0]),
                 measured[1] - (planned[1] - lasting[1]))),
@@ -264,9 +266,10 @@ class PostureController:
                 plan.expected, beside, feet, self._footholds, positions, duty, omega),
                 terrain.rough, terrain.gaps), felt or FELT, level)
 
-    def _ground(self, terrain: Terrain, state: RobotState, normal_in_base: Triple,
-                feet_in_base: Sequence[Triple], swung: Sequence[float], gait: GaitInForce,
-                velocities: Sequence[Triple]) -> tuple[Terrain, tuple[float, ...]]:
+    def _ground(self, terrain: Terrain, state: RobotState, foot_force: Array,
+                normal_in_base: Triple, feet_in_base: Sequence[Triple], swung: Sequence[float],
+                gait: GaitInForce, velocities: Sequence[Triple]
+                ) -> tuple[Terrain, tuple[float, ...]]:
         """Memory of the ground, and heights of the feet over the plane with a normal that the body
         follows [m]; a body tells a first step at low velocities (v_x, v_y [m/s], γ [rad/s]) of the
         reference and its own only.
@@ -279,8 +282,7 @@ class PostureController:
                 and all(self.scale.foot_speed(*velocity) < limit for velocity in velocities))
         return terrain.felt(
             place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot in feet_in_base],
-            n, swung,
-            [force > self._touch_force for force in believed(state.foot_force).tolist()],
+            n, swung, [force > self._touch_force for force in foot_force.tolist()],
             self.scale.leg_length, calm, all(end.steps == len(LEGS) for end in gait.ends))
 
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], swings: list[float],
@@ -333,5 +335,5 @@ class PostureController:
         for on_foot, (_, J) in zip(forces, legs, strict=True):
             torques += vec3.transposed_times(
                 J, vec3.transposed_times(body.R_ground_base, on_foot))
-        most = self._torque_limit
-        return np.minimum(np.maximum(-np.array(torques), -most), most)
+        return np.array([clamped(-torque, -most, most) for torque, most in zip(
+            torques, self._torque_limit, strict=True)])
