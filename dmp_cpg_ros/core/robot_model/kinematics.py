@@ -80,7 +80,11 @@ class LegKinematics:
         ndarray (3, 3)
             ∂ foot_in_base / ∂ q [m/rad].
         """
-        return np.array(self._jacobian(self._chain(q)))
+        return np.array(self.jacobian(q))
+
+    def jacobian(self, q: Array | Sequence[float]) -> Matrix:
+        """:meth:`jacobian_in_base` as a tuple."""
+        return self._jacobian(self._chain(q))
 
     def foot_and_jacobian(self, q: Array | Sequence[float]) -> tuple[Triple, Matrix]:
         """:meth:`foot_in_base` and :meth:`jacobian_in_base` for the price of one, as tuples."""

@@ -235,8 +235,7 @@ class LegPrimitive:
         v_x, v_y, v_z = plus(offset_rate, path_velocity)
         goal = self.kinematics.angles(
             (p_x, p_y, p_z + (stumble.height - activity * bounce.height)))
-        _, jacobian = self.kinematics.foot_and_jacobian(goal)
-        goal_velocity = damped_solution(jacobian, (
+        goal_velocity = damped_solution(self.kinematics.jacobian(goal), (
             v_x, v_y, v_z + stumble.rate - activity * bounce.velocity * (rate / omega)))
         joints = self.transformation.follow(state.joints, goal, goal_velocity, dt)
         return LegState(joints, activity, offset, stumble, motion, sent), goal, goal_velocity
@@ -259,7 +258,8 @@ class LegPrimitive:
         """
         if dt <= 0.0:
             return (0.0, 0.0, 0.0), state.stumble
-        stands, will_stand = (abs(at) >= 0.5 * (1.0 - path.duty) for at in positions)
+        edge, (now, then) = 0.5 * (1.0 - path.duty), positions
+        stands, will_stand = abs(now) >= edge, abs(then) >= edge
         measured, target = self.kinematics.foot(feedback.joint_position), self.kinematics.foot(
             acting)
         away, offset = minus(measured, target), state.shift_in_base
@@ -267,7 +267,7 @@ class LegPrimitive:
         if lift and not stands:
             touches = feedback.foot_force > self.touch_force
             progress = reflex.swing_progress(
-                path, path.swung(positions[0]), measured, target, touches)
+                path, path.swung(now), measured, target, touches)
         stumble = reflex.stumble_step(
             state.stumble, progress, lift if stands else activity * lift, lag, dt,
             feedback.rough > 0.0)
@@ -277,7 +277,7 @@ class LegPrimitive:
             return self.offset_rates.in_stance(
                 offset, drift, slipped, activity, dt, feedback.level), stumble
         placement = triple(feedback.shift_in_base.tolist())
-        height, _ = swing_height(path.swung(positions[1]))
+        height, _ = swing_height(path.swung(then))
         rate = self.offset_rates.in_swing(offset, placement, height, activity, dt)
         return reflex.compliant_offset_rate(stumble, rate, path_velocity, away), stumble
 
