@@ -99,17 +99,20 @@ class SerializedJointState(Serialized):
     def __getattr__(self, field: str) -> Array:
         if field not in FIELDS:
             raise AttributeError(field)
-        begin, end = self._places[field]
-        array = np.frombuffer(self.serialized[begin:end])
+        array = self._array(field)
         setattr(self, field, array)
         return array
+
+    def _array(self, field: str) -> Array:
+        begin, end = self._places[field]
+        return np.frombuffer(self.serialized[begin:end])
 
     def checked(self, fields: Sequence[str]) -> list[Array]:
         """Arrays whose numbers are finite, checked once for all readers; raises DataError."""
         sound = self._sound
         for field in fields:
             if field not in sound:
-                array = getattr(self, field)
+                array = self._array(field)  # without __getattr__'s price, a failed look-up
                 sound[field] = array if self._trusted else checked(array, field)
         return [sound[field] for field in fields]
 
