@@ -160,6 +160,7 @@ class ReferenceSystem:
         self.parameters, self._filter = parameters, FirstOrderFilter(parameters.alpha_r)
         self._foot_distance = foot_distance
         self._governor, self.limited = governor or Governor(), False
+        self._left = 0.0, 1.0  # length of a step [s] and what is left of a deviation after it
 
     def towards(self, r: Array, command: tuple[float, float, float], inhibition: Inhibition,
                 dt: float) -> Array:
@@ -172,7 +173,7 @@ class ReferenceSystem:
             return self._towards(r, (share * v_x, share * v_y, share * gamma), dt)
         v_x, v_y, gamma = r.tolist()
         speed = (v_x * v_x + v_y * v_y) ** 0.5 + abs(gamma) * self._foot_distance
-        kept, lost = self._filter.kept(dt), self.parameters.braking * dt
+        kept, lost = self._kept(dt), self.parameters.braking * dt
         if lost <= (1.0 - kept) * speed:
             return self._towards(r, (0.0, 0.0, 0.0), dt)
         return r * max(0.0, 1.0 - lost / speed) if speed > 0.0 else np.zeros(3)
@@ -195,10 +196,15 @@ class ReferenceSystem:
         """
         return self._towards(r, triple(r_ext.tolist()), dt)
 
+    def _kept(self, dt: float) -> float:
+        """Share exp(−α_r dt) of a deviation that a step leaves; ticks are of one length."""
+        if self._left[0] != dt:
+            self._left = dt, float(self._filter.kept(dt))
+        return self._left[1]
+
     def _towards(self, r: Array, r_ext: Triple, dt: float) -> Array:
         """As :meth:`step`."""
-        kept, (x, y, gamma), (to_x, to_y, to_gamma) = (
-            float(self._filter.kept(dt)), r.tolist(), r_ext)
+        kept, (x, y, gamma), (to_x, to_y, to_gamma) = self._kept(dt), r.tolist(), r_ext
         after_x, after_y = to_x + (x - to_x) * kept, to_y + (y - to_y) * kept
         following = np.array((after_x, after_y, to_gamma + (gamma - to_gamma) * kept))
         self.limited = False
