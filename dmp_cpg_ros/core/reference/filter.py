@@ -81,10 +81,10 @@ class CommandGate:
                  gaits: Sequence[Gait] = ()) -> None:
         """Start with a zero command."""
         self._scale, self.limited_by = scale, ''
-        self.asked: tuple[float, float, float] = (0.0, 0.0, 0.0)
-        self.follow(parameters, gaits)
-        self._command: tuple[float, float, float] = (0.0, 0.0, 0.0)
+        self.asked: Triple = (0.0, 0.0, 0.0)
+        self._command: Triple = (0.0, 0.0, 0.0)
         self._received_ns, self._fresh = 0, False
+        self.follow(parameters, gaits)
 
     def follow(self, parameters: ReferenceParameters, gaits: Sequence[Gait]) -> None:
         """Take new limits; they hold for the next command, those of the gait at once."""
@@ -92,6 +92,7 @@ class CommandGate:
         scale, self._fastest = self._scale, None
         if gaits and scale is not None:
             self._fastest = max(gaits, key=lambda gait: gait.highest(scale))
+        self._limit()
 
     def accept(self, v_x: float, v_y: float, gamma: float) -> None:
         """Take a new command; it acts from the next :meth:`at` on.
@@ -115,6 +116,17 @@ class CommandGate:
             (v_x, v_y, gamma), limits, strict=True))
         self.asked = asked
         self._command, self._fresh = (v_x, v_y, gamma), True
+        self._limit()
+
+    def _limit(self) -> None:
+        """Bring the command within the limits of the fastest gait."""
+        gait, self._limited = self._fastest, self._command
+        self._cut_by = '' if self._command == self.asked else 'range'
+        if gait is not None and self._scale is not None:
+            self._limited = gait.limited(
+                self._command, self._scale, self.parameters.max_curve * gait.two_sided)
+            if self._limited != self._command:
+                self._cut_by = 'gait'
 
     def at(self, time_ns: int) -> tuple[float, float, float]:
         """Command that acts at a time on the robot's clock [ns]: (v_x, v_y, γ)."""
@@ -125,15 +137,8 @@ class CommandGate:
         if timeout > 0.0 and (time_ns - self._received_ns) * 1e-9 > timeout:
             self.limited_by = 'timeout'
             return 0.0, 0.0, 0.0
-        self.limited_by = '' if self._command == self.asked else 'range'
-        if self._scale is None or self._fastest is None:
-            return self._command
-        gait = self._fastest
-        limited = gait.limited(
-            self._command, self._scale, self.parameters.max_curve * gait.two_sided)
-        if limited != self._command:
-            self.limited_by = 'gait'
-        return limited
+        self.limited_by = self._cut_by
+        return self._limited
 
 
 class ReferenceSystem:
