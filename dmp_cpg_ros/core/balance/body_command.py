@@ -44,5 +44,8 @@ class BodyCommand:
         return self.mode in BALANCED
 
 
-STANDING = BodyCommand()
+WITHOUT_MOVEMENT = {mode: BodyCommand(mode) for mode in MODES}
+"""Command of each mode while no movement is under way."""
+
+STANDING = WITHOUT_MOVEMENT['standing']
 """The gait may run."""

@@ -148,6 +148,10 @@ class FallState:
         return FallState(tuple(carried(stamp, last_ns, now_ns) for stamp in self.since_ns))
 
 
+NOT_FALLING = FallState()
+"""Of a robot that shows no sign of a fall."""
+
+
 class FallDetector:
     """Fall detector; state in, state out.
 
@@ -172,7 +176,7 @@ class FallDetector:
         signs = (condition.tilt > p.fall_tilt, standing and height < p.fall_height,
                  standing and condition.support < p.fall_support)
         if not any(signs):  # as it always is
-            return FallState(), ''
+            return NOT_FALLING, ''
         since = tuple((before if before >= 0 else time_ns) if present else -1
                       for before, present in zip(state.since_ns, signs, strict=True))
         delays = (p.fall_delay, p.fall_delay, p.fall_support_delay)

@@ -11,11 +11,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmp_cpg_ros.core.balance.body_command import BALANCED, BodyCommand
+from dmp_cpg_ros.core.balance.body_command import BALANCED, WITHOUT_MOVEMENT, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase_rate
 from dmp_cpg_ros.core.clock import carried
@@ -88,7 +88,7 @@ class ModeState:
     tries: int = 0
     reason: str = ''
     condition: falls.BodyCondition | None = None
-    fall: falls.FallState = field(default_factory=falls.FallState)
+    fall: falls.FallState = falls.NOT_FALLING
     lowered: bool = False
 
 
@@ -132,7 +132,7 @@ class ModeManager:
     def command(self, state: ModeState) -> BodyCommand:
         """What the legs have to do at the tick of a state."""
         if not state.movements:
-            return BodyCommand(state.mode)
+            return WITHOUT_MOVEMENT[state.mode]
         name = state.movements[0]
         x, decay = phase_at(self._share(state)), unit_movement().phase_decay
         return BodyCommand(state.mode, name, x, -decay / self.movements.named(name).duration * x)
@@ -263,7 +263,7 @@ class ModeManager:
 def enter(state: ModeState, mode: str, movements: tuple[str, ...], reason: str) -> ModeState:
     """Enter a mode at the next tick, whose stamp is not known yet."""
     return replace(state, mode=mode, movements=movements, reason=reason, begun_ns=-1,
-                   fall=falls.FallState())
+                   fall=falls.NOT_FALLING)
 
 
 def _enter_now(state: ModeState, mode: str, reason: str, movements: tuple[str, ...] = ()

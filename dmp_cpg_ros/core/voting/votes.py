@@ -83,6 +83,8 @@ class VoteInbox:
         """Votes since the last call, one of each voter, in the order of their arrival; who is
         neither among these voters nor among those whose votes are alive is forgotten.
         """
+        if not self._voters:
+            return ()
         waiting, self._waiting = self._waiting, {}
         self._voters = {*waiting, *self._voters.intersection(alive)}
         return tuple(waiting.items())
