@@ -18,12 +18,14 @@ footholds do only by the share ``FOLLOWED``: between two steps it is too steep, 
 foot of a way down, where a body that follows it dives.
 
 **Rough.** ρ is the height of what the feet are to be lifted over. It is 0 until one foothold is
-higher than the median of all by more than ``STEP`` l, l the length of the leg, under a body that
-does not roll, for after a push it feels steps where there are none; that is at less than ``SLOW``
-of its gait's highest speed, near which the footholds of a walk differ as much on even ground; and
-that is borne by both sides and both ends (``firm``): a pronk that brakes pitches as much. A lower
-one tells nothing: the foot may as well hang in a gap, and to look for the ground there, or to
-count on it, overturns the robot. From there on ρ grows to
+higher than the median of all by more than ``STEP`` l, l the length of the leg, or a swinging foot
+meets something: a body that waited for its first foothold on a step would walk over forefeet that
+the riser holds. That counts under a body that does not roll, for after a push it feels steps where
+there are none; that is at less than ``SLOW`` of its gait's highest speed, near which the footholds
+of a walk differ as much on even ground; and that is borne by both sides and both ends (``firm``):
+a pronk that brakes pitches as much. A lower foothold tells nothing, nor does what a foot meets
+while one is lower by ``HOLLOW`` l: a foot may as well be in a gap, and to look for the ground
+there, or to count on it, overturns the robot. From there on ρ grows to
 
 - max e − min e, where this is more than ``UNEVEN`` l: feet stand on steps, up or down;
 - h + ``MARGIN`` l for a foot that touches something in the middle of its swing, at h over the mean
@@ -174,8 +176,10 @@ class Terrain(NamedTuple):
         found = calm and high - middle > STEP * leg_length
         if found or (rough and high - low > UNEVEN * leg_length):
             rough = max(rough, high - low)
+        even = not (anew or self.gaps) and middle - low < HOLLOW * leg_length
+        tells = rough > 0.0 or (calm and even)
         for foot, share, touch in zip(feet, swung, touches, strict=True):
-            if rough and touch and SCUFFING[0] < share < SCUFFING[1]:
+            if tells and touch and SCUFFING[0] < share < SCUFFING[1]:
                 height = dot(normal, foot) - mean
                 if height > CLEAR_OF_GROUND * leg_length:
                     rough = max(rough, height + MARGIN * leg_length)

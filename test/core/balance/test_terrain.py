@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.balance.terrain import (
+    CLEAR_OF_GROUND,
     FADES,
     FOLLOWED,
     FORGOTTEN,
@@ -115,8 +116,25 @@ def test_swinging_foot_that_touches_tells_a_step() -> None:
     assert met.rough == pytest.approx(0.05 + MARGIN * LENGTH)
     missed, _ = felt((0.05, 0.0, 0.0, 0.0), terrain, swung=swung, touches=(False, *touches[1:]))
     assert missed.rough == KNOWN.rough
-    assert felt((0.05, 0.0, 0.0, 0.0), felt((0.0,) * 4)[0], swung=swung)[0].rough == 0.0
     assert missed.footholds == terrain.footholds  # where it swings is no foothold
+
+
+@pytest.mark.parametrize('calm', [False, True])
+@pytest.mark.parametrize('height', [CLEAR_OF_GROUND / 2.0, CLEAR_OF_GROUND * 1.5])
+def test_swinging_foot_finds_the_first_step(calm: bool, height: float) -> None:
+    terrain, height = felt((0.0,) * 4)[0], height * LENGTH
+    met, _ = felt((height, 0.0, 0.0, 0.0), terrain, swung=(SWINGING, *(STANDING,) * 3), calm=calm)
+    finds = calm and height > CLEAR_OF_GROUND * LENGTH
+    assert met.rough == pytest.approx(height + MARGIN * LENGTH if finds else 0.0)
+
+
+@pytest.mark.parametrize('gaps', [0.0, 0.1])
+@pytest.mark.parametrize('depth', [HOLLOW / 2.0, HOLLOW * 1.5])
+def test_swinging_foot_that_may_be_in_a_gap_tells_nothing(gaps: float, depth: float) -> None:
+    lower, up = -depth * LENGTH, 2.0 * CLEAR_OF_GROUND * LENGTH
+    terrain = felt((0.0, 0.0, 0.0, lower))[0]._replace(gaps=gaps)
+    met, _ = felt((up, 0.0, 0.0, lower), terrain, swung=(SWINGING, *(STANDING,) * 3))
+    assert (met.rough > 0.0) == (not gaps and depth < HOLLOW)
 
 
 def test_foot_in_the_air_looks_for_the_ground_where_it_is_rough() -> None:
