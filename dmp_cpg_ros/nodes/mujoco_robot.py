@@ -100,6 +100,7 @@ class MujocoRobotNode(DrivenRobot):
     def activate(self) -> None:
         """Begin with the first tick: at the gate, when all nodes are connected, or at once."""
         self._timer: Any = None
+        self._others: ReadinessOfOthers | None = None
         self.tell_drive('')
         if self._options.gated:
             self._hold()
@@ -118,6 +119,9 @@ class MujocoRobotNode(DrivenRobot):
         if self._timer is not None:
             self.destroy_timer(self._timer)
             self._timer = None
+        if self._others is not None:
+            self._others.end()
+            self._others = None
 
     def cleanup(self) -> None:
         """Close the window."""
@@ -255,7 +259,7 @@ class MujocoRobotNode(DrivenRobot):
     # Lock-step -----------------------------------------------------------------------------------
 
     def _start_when_connected(self) -> None:
-        if self._timer is None:                                  # was due when it was destroyed
+        if self._timer is None or self._others is None:          # was due when it was destroyed
             return
         # A tick that one of the others loses would be waited for for ever.
         missing = self.missing() + self._others.missing()
@@ -277,9 +281,9 @@ class MujocoRobotNode(DrivenRobot):
         self._reminded_ns = now
 
     def _hold(self) -> None:
-        """Publish the state, or wait at the gate until it may be published."""
+        """Go on, or wait at the gate until the state may be published."""
         if not self._options.gated or self._open_until >= self._state.time_ns:
-            self._publish_state()
+            self._go_on()
             return
         self._holding = True
         message = Clock()
@@ -294,10 +298,12 @@ class MujocoRobotNode(DrivenRobot):
         self._open_until = max(self._open_until, until)
         if not self._holding or self._open_until < self._state.time_ns:
             return
+        self._go_on()
+
+    def _go_on(self) -> None:
         if self.lock_step:
             self._publish_state()
         else:
-            self._holding = False
             self._start_real_time()
 
     # Real time -----------------------------------------------------------------------------------

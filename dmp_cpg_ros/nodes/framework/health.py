@@ -293,6 +293,12 @@ class ReadinessOfOthers:
                                      client.call_async(Trigger.Request()))
         return [f'{name}: {self._said.get(name, NO_ANSWER)}' for name in self._clients]
 
+    def end(self) -> None:
+        """Ask no more."""
+        for client in self._clients.values():
+            self._node.destroy_client(client)
+        self._clients = {}
+
 
 def missing_connections(node: Node, kind: str,
                         outputs: Sequence[tuple[Interface, Sequence[str], Publisher]],

@@ -1,0 +1,77 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes that are deactivated, cleaned up and brought up again, with nothing of before."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+import ros_processes
+from rclpy.parameter import Parameter
+from ros_processes import Ros
+from rosgraph_msgs.msg import Clock
+
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
+from dmp_cpg_ros.suite_table import KINDS
+
+ros, ros_domain = ros_processes.ros, ros_processes.ros_domain
+
+
+def made(ros: Ros, node_class: type[SuiteNode], **parameters: Any) -> Any:
+    """A node of the test that does nothing yet."""
+    node = node_class(context=ros.context, parameter_overrides=[
+        Parameter(name, value=value) for name, value in parameters.items()])
+    ros.nodes.append(node)
+    return node
+
+
+def begin_anew(node: SuiteNode) -> None:
+    """Through all states and back to ``active``."""
+    for transition in (node.trigger_deactivate, node.trigger_cleanup):
+        transition()
+    node.start()
+
+
+@pytest.mark.parametrize(('kind', 'lock_step'), [
+    (kind, lock_step) for kind, row in KINDS.items() for lock_step in (False, True)
+    if not lock_step or kind not in ('bag_recorder', 'ros2_control_driver')])
+def test_a_node_that_begins_anew_leaves_nothing_behind(
+        ros: Ros, tmp_path: Path, kind: str, lock_step: bool) -> None:
+    parameters: dict[str, Any] = {'lock_step': True} if lock_step else {}
+    if kind == 'bag_recorder':
+        parameters['output'] = str(tmp_path / 'bag')
+    node = made(ros, getattr(import_module(KINDS[kind].module), KINDS[kind].class_name),
+                **parameters)
+
+    def entities() -> list[int]:
+        return [len(list(entries)) for entries in (
+            node.publishers, node._subscriptions, node.services, node.clients, node.timers,
+            node.waitables)]
+
+    idle = entities()
+    node.start()
+    active = entities()
+    for _ in range(3):
+        begin_anew(node)
+        assert entities() == active
+    node.trigger_deactivate()
+    node.trigger_cleanup()
+    assert entities() == idle
+
+
+def test_a_robot_whose_gate_is_open_goes_on_when_it_is_activated_again(ros: Ros) -> None:
+    robot = made(ros, MujocoRobotNode, physics='perfect_tracking', gated=True)
+    robot.start()
+    ros.executor.add_node(robot)
+    opened = Clock()
+    opened.clock.sec = 3600
+    robot._on_advance(opened)
+    for _ in range(2):
+        then = robot.health.stamp_ns
+        ros.spin_until(lambda then=then: robot.health.stamp_ns > then)
+        robot.trigger_deactivate()
+        robot.trigger_activate()
