@@ -10,10 +10,13 @@ from typing import Any
 
 import pytest
 import ros_processes
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.parameter import Parameter
 from ros_processes import Ros
 from rosgraph_msgs.msg import Clock
 
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
 from dmp_cpg_ros.suite_table import KINDS
@@ -75,3 +78,28 @@ def test_a_robot_whose_gate_is_open_goes_on_when_it_is_activated_again(ros: Ros)
         ros.spin_until(lambda then=then: robot.health.stamp_ns > then)
         robot.trigger_deactivate()
         robot.trigger_activate()
+
+
+def test_what_was_wrong_before_a_node_begins_anew_is_not_told_any_more(ros: Ros) -> None:
+    oscillators = made(ros, CanonicalOscillators)
+    oscillators.start()
+    late = 2_000_000_000
+    oscillators._take_inhibition(late, (1, oscillators._inhibition))
+
+    def told() -> Any:
+        return oscillators.health.status('', {}, periodic=False).status[0]
+
+    assert 'inhibition is silent' in told().message
+    begin_anew(oscillators)
+    assert isinstance(oscillators._inhibition, Inhibition)
+    oscillators._take_inhibition(late, (late, oscillators._inhibition))
+    assert told().level == DiagnosticStatus.OK
+
+
+def test_a_node_is_configured_with_what_was_accepted_last(ros: Ros) -> None:
+    oscillators = made(ros, CanonicalOscillators)
+    oscillators.trigger_configure()
+    assert oscillators.set_parameters([Parameter('gait', value='trot')])[0].successful
+    oscillators.trigger_cleanup()
+    oscillators.start()
+    assert oscillators.diagnostic_values()['gait'] == 'trot'

@@ -104,6 +104,10 @@ class NodeHealth:
         """Withdraw a warning; returns whether there was one."""
         return self._problems.pop(key, None) is not None
 
+    def forget_problems(self) -> None:
+        """Withdraw all warnings: what would clear them has gone."""
+        self._problems = {}
+
     def status(self, state: str, values: Mapping[str, Any], *, periodic: bool) -> DiagnosticArray:
         """Build the report.
 

@@ -170,6 +170,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
     def _leave(self, result: TransitionCallbackReturn, label: str = 'unconfigured',
                ) -> TransitionCallbackReturn:
         self.destroy_entities()
+        self.health.forget_problems()
         return self._enter(label, result)
 
     def _enter(self, label: str, result: TransitionCallbackReturn) -> TransitionCallbackReturn:

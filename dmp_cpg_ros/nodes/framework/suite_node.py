@@ -335,6 +335,7 @@ class SuiteNode(GuardedLifecycleNode):
         self._commands.forget()
         self.writers.forget()
         self._outputs = self._outputs[:1]
+        self._sets = self.parameter_changes.accepted
 
     def missing(self) -> list[str]:
         """List connections with the expected nodes that do not stand yet; empty when all do."""
