@@ -23,6 +23,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import TwistStamped
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -319,6 +320,26 @@ def test_a_change_that_cannot_be_is_refused_with_the_reason(ros: Ros, started: R
     robot.tick()
     assert started.changes == [(1, 3.0, 6)]
     assert started.parameters_of(OtherParameters).upper == 6.0
+
+
+@pytest.mark.parametrize('service', [SetParameters, SetParametersAtomically])
+def test_what_is_no_parameter_or_no_value_is_refused_with_what_is_valid(
+        ros: Ros, started: Relay, service: Any) -> None:
+    unknown, nameless, odd, good = (
+        ParameterMessage(name=name, value=value) for name, value in (
+            ('alpha_q', Parameter('', value=1.0).to_parameter_msg().value),
+            ('', Parameter('', value=1.0).to_parameter_msg().value),
+            ('alpha_r', ParameterValue(type=77)),
+            ('alpha_r', Parameter('', value=9.0).to_parameter_msg().value)))
+    name = 'relay/set_parameters' + '_atomically' * (service is SetParametersAtomically)
+    for wrong, reason in ((unknown, "no parameter 'alpha_q'; did you mean alpha_r"),
+                          (nameless, "no parameter ''; valid are"),
+                          (odd, "'alpha_r' has the type 77; valid are 0 to 9")):
+        answer = ros.call(service, name, service.Request(parameters=[wrong, good]))
+        results = answer.results if service is SetParameters else [answer.result]
+        assert not results[0].successful and reason in results[0].reason
+        assert [result.successful for result in results[1:]] == [True] * (len(results) - 1)
+    assert not started.has_parameter('')
 
 
 def test_a_changeable_name_must_be_a_parameter() -> None:

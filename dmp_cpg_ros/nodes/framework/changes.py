@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rclpy.parameter import Parameter
 
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
@@ -19,6 +19,9 @@ from dmp_cpg_ros.nodes.framework.judging import InTurn, Step, Steps, beside_tick
 
 if TYPE_CHECKING:
     from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+
+VALUE_TYPES = range(ParameterType.PARAMETER_NOT_SET, ParameterType.PARAMETER_STRING_ARRAY + 1)
+"""Types of values that a request may have."""
 
 MOST_VERDICTS = 8
 """How often a change is judged anew because what runs has become another meanwhile."""
@@ -79,33 +82,46 @@ class ParameterChanges:
         return self._in_turn.take(self._steps(make, request, response), response)
 
     def _steps(self, make: Callable[[Any, Any], Any], request: Any, response: Any) -> Steps:
-        make = self._node.guarded('set_parameters', make)
         entries, one_by_one = list(request.parameters), hasattr(response, 'results')
         for group in [[entry] for entry in entries] if one_by_one else [entries]:
-            refused = yield from self._refusal(group)
-            if refused is None:
-                made = make(type(request)(parameters=group), type(response)())
-                results = made.results if one_by_one else [made.result]
-            else:
-                results = [refused]
+            result = yield from self._refusal(group)
+            if result is None:
+                try:
+                    made = make(type(request)(parameters=group), type(response)())
+                    result = made.results[0] if one_by_one else made.result
+                except Exception as error:  # noqa: BLE001 - each parameter has its answer
+                    result = self._refused(error)
             if one_by_one:
-                response.results.extend(results)
+                response.results.append(result)
             else:
-                (response.result,) = results
+                response.result = result
 
     def _refusal(self, group: Sequence[Any]) -> Generator[Step, None, SetParametersResult | None]:
         """Have what a change is judged by computed; why it is refused where that is impossible."""
         try:
+            for entry in group:
+                self._check_entry(entry)
             for _ in range(MOST_VERDICTS):
                 asked = self._to_judge(group)
                 if asked is None:
                     break
                 yield asked
         except Exception as error:  # noqa: BLE001 - whatever it is, the request is answered
-            expected = isinstance(error, DmpCpgError)
-            reason = str(error) if expected else self._node.drop('set_parameters', error)
-            return SetParametersResult(successful=False, reason=reason)
+            return self._refused(error)
         return None
+
+    def _refused(self, error: Exception) -> SetParametersResult:
+        expected = isinstance(error, DmpCpgError)
+        reason = str(error) if expected else self._node.drop('set_parameters', error)
+        return SetParametersResult(successful=False, reason=reason)
+
+    def _check_entry(self, entry: Any) -> None:
+        """Raise ParameterError for what rclpy refuses without a word of what is wrong."""
+        if not self._node.has_parameter(entry.name):
+            raise ParameterError(self._table.unknown(entry.name))
+        if entry.value.type not in VALUE_TYPES:
+            raise ParameterError(f"the value of '{entry.name}' has the type {entry.value.type}; "
+                                 f'valid are {min(VALUE_TYPES)} to {max(VALUE_TYPES)}')
 
     def _to_judge(self, entries: Sequence[Any]) -> Step | None:
         """What has to be computed before a change can be judged at once."""

@@ -108,12 +108,15 @@ class ParameterTable:
         """
         for name in values:
             if name not in self.fields:
-                raise ParameterError(
-                    f"there is no parameter '{name}'; {nearest(name, self.fields)}valid are "
-                    f"{', '.join(sorted(self.fields))}")
+                raise ParameterError(self.unknown(name))
         return {parameter_set: parameter_set(**{
             field.name: values.get(field.name, self.fields[field.name].default)
             for field in dataclasses.fields(parameter_set)}) for parameter_set in self.sets}
+
+    def unknown(self, name: str) -> str:
+        """Say that there is no such parameter, and which there are."""
+        return (f"there is no parameter '{name}'; {nearest(name, self.fields)}valid are "
+                f"{', '.join(sorted(self.fields))}")
 
     def values(self, sets: Mapping[type[Parameters], Parameters]) -> dict[str, Any]:
         """Flatten sets to a dict from every name to its value."""
