@@ -13,20 +13,18 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-import rclpy
 from rclpy.client import Client
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.commands.ros_arguments import checked_namespace
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
-from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
+from dmp_cpg_ros.nodes.framework.execution import prepare_middleware, start_ros
 from dmp_cpg_ros.nodes.messages.commands import twist
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, Interface, interface
 
@@ -181,7 +179,7 @@ def _interrupt(number: int, _: object) -> None:
 
 def connected(name: str, words: Sequence[str], wait_s: float) -> SuiteClient:
     """Begin with ROS, as a node that looks for the suite so long [s]."""
-    rclpy.init(args=[name, *words], signal_handler_options=SignalHandlerOptions.NO)
+    start_ros([name, *words])
     return SuiteClient(Node(name, enable_rosout=False, start_parameter_services=False), wait_s)
 
 

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-import rclpy
 from rclpy.context import Context
 from rclpy.node import Node
 
@@ -44,7 +43,7 @@ def alone_in_domain(namespace: str, meanwhile: Callable[[], Any] = lambda: None
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     execution.prepare_middleware()
     context = Context()
-    rclpy.init(context=context, args=[])
+    execution.start_ros([], context)
     try:
         domain = context.get_domain_id()
         held = claims.claim(f'{namespace}/suite', domain)

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import rclpy
-from rclpy.signals import SignalHandlerOptions
 
 from dmp_cpg_ros.commands.ending_signals import ending_signals
 from dmp_cpg_ros.commands.fork_server import ForkServer
@@ -78,7 +77,7 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
     """
     group, views = ProcessGroup(logs, server), ProcessGroup(logs, server)
     with ending_signals() as interrupted:
-        rclpy.init(args=['walk', *arguments], signal_handler_options=SignalHandlerOptions.NO)
+        execution.start_ros(['walk', *arguments])
         try:
             if view:  # its address holds a token, which is for the terminal only
                 views.start('live_view', ['live_view', *arguments], logged=False)

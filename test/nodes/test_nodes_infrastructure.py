@@ -751,6 +751,31 @@ def test_bad_arguments_end_a_process_with_status_two(processes: Processes) -> No
         ended(process, status, *words)
 
 
+@pytest.mark.parametrize('command', [
+    ('reference_filter',), ('walk', '--no-report'), ('robot_client', 'nodes')])
+@pytest.mark.parametrize(('variable', 'value', 'valid'), [
+    ('ROS_DOMAIN_ID', 'mine', '0 to 232'),
+    ('ROS_DOMAIN_ID', '233', '[0, 232]'),
+    ('ROS_LOG_DIR', '/dev/null/log', 'set ROS_LOG_DIR to a folder')])
+def test_an_environment_that_ros_refuses_is_named_in_a_line(
+        processes: Processes, tmp_path: Path, command: tuple[str, ...], variable: str, value: str,
+        valid: str) -> None:
+    out = ('--out', str(tmp_path / 'run')) if command[0] == 'walk' else ()
+    process = processes.python('-m', 'dmp_cpg_ros', *command, *out, **{variable: value})
+    ended(process, 2, f'{command[0]}: ', valid)
+
+
+def test_a_namespace_that_ros_refuses_is_named_in_a_line(processes: Processes) -> None:
+    ended(processes.node('reference_filter', '-r', '__ns:=/robot1/'), 2, 'invalid node namespace')
+
+
+def test_without_a_folder_for_claims_it_is_said_which_is_needed(
+        processes: Processes, tmp_path: Path) -> None:
+    (tmp_path / f'dmp_cpg_ros_claims_{os.getuid()}').touch()
+    process = processes.python('-m', 'dmp_cpg_ros', 'reference_filter', TMPDIR=str(tmp_path))
+    ended(process, 2, 'set TMPDIR to a folder')
+
+
 # Middleware ------------------------------------------------------------------------------------
 
 

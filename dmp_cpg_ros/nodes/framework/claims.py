@@ -36,10 +36,17 @@ def claim(name: str, domain: int) -> IO[str]:
     ------
     AlreadyRunningError
         If another process of this user has it; the text says which.
+    ParameterError
+        If there is no folder for temporary files.
     """
-    folder = Path(tempfile.gettempdir()) / f'dmp_cpg_ros_claims_{os.getuid()}'
-    folder.mkdir(mode=0o700, exist_ok=True)
-    file = (folder / f'{_network()}_{domain}{name.replace("/", ".")}').open('a+', encoding='utf-8')
+    try:
+        folder = Path(tempfile.gettempdir()) / f'dmp_cpg_ros_claims_{os.getuid()}'
+        folder.mkdir(mode=0o700, exist_ok=True)
+        file = (folder / f'{_network()}_{domain}{name.replace("/", ".")}').open(
+            'a+', encoding='utf-8')
+    except OSError as error:
+        raise ParameterError(f'temporary files cannot be written: {error}; set TMPDIR to a folder '
+                             'where they can') from error
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

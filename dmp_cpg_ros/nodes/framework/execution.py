@@ -19,7 +19,7 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -83,6 +83,50 @@ def prepare_middleware() -> None:
         os.environ.update(dict.fromkeys(VARIABLES, subnet))
 
 
+MOST_DOMAIN = 232
+"""The highest ROS domain: beyond it the middleware has no ports, and ends the process."""
+
+_ADVICE = {'logging': '; set ROS_LOG_DIR to a folder that can be written',
+           'ROS_DOMAIN_ID': f'; valid are 0 to {MOST_DOMAIN}'}
+"""What to do, by a word of what ROS says."""
+
+
+def start_ros(arguments: Sequence[str], context: Context | None = None) -> None:
+    """Start ROS 2 without its signal handlers.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Program and command line.
+    context : Context, optional
+        Default: the global one.
+
+    Raises
+    ------
+    ParameterError
+        If ROS refuses its environment, such as ``ROS_DOMAIN_ID``.
+    """
+    with _cannot_start():
+        rclpy.init(args=[*arguments], context=context,
+                   signal_handler_options=SignalHandlerOptions.NO)
+    context = context or get_default_context()
+    domain = context.get_domain_id()
+    if domain > MOST_DOMAIN:
+        context.shutdown()
+        raise ParameterError(f'ROS_DOMAIN_ID = {domain} must be in [0, {MOST_DOMAIN}]')
+
+
+@contextlib.contextmanager
+def _cannot_start() -> Iterator[None]:
+    """Raise ParameterError for what ROS refuses, in a line."""
+    try:
+        yield
+    except rclpy_implementation.RCLError as error:
+        reason = ' '.join(str(error).partition(', at /')[0].split())
+        advice = (text for word, text in _ADVICE.items() if word in reason)
+        raise ParameterError(f'ROS 2 cannot start: {reason}{next(advice, "")}') from error
+
+
 _THREADS = '/proc/self/task'
 
 
@@ -127,7 +171,6 @@ OK, FAILED, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
 
 _BAD_ARGUMENTS = (ParameterError, MissingFileError, ParameterException,
-                  rclpy_implementation.RCLInvalidROSArgsError,
                   rclpy_implementation.UnknownROSArgsError)
 
 
@@ -249,13 +292,15 @@ def _end_within(seconds: float) -> None:
 
 def _run(program: str, arguments: Sequence[str], make: Callable[[], Iterable[SuiteNode]],
          nodes: list[SuiteNode], until: Future) -> None:
-    unknown = remove_ros_args([program, *arguments])[1:]
+    with _cannot_start():
+        unknown = remove_ros_args([program, *arguments])[1:]
     if unknown:
         raise ParameterError(
             f"unknown argument '{unknown[0]}'; valid are --help and --ros-args ...")
     prepare_middleware()
-    rclpy.init(args=[program, *arguments], signal_handler_options=SignalHandlerOptions.NO)
-    nodes.extend(make())
+    start_ros([program, *arguments])
+    with _cannot_start():
+        nodes.extend(make())
     claims = [claim(node.get_fully_qualified_name(), node.context.get_domain_id())
               for node in nodes]
     for node in nodes:
