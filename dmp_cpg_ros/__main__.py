@@ -9,8 +9,11 @@ quietly from the first moment on.
 from __future__ import annotations
 
 import ast
+import os
+import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
@@ -76,9 +79,11 @@ def run(name: str) -> int:
             print(f"dmp_cpg_ros: there is no '{name}'; {guess}valid are {', '.join(names)}",
                   file=sys.stderr)
             return BAD_INPUT
-        if _folder(name) == 'nodes':
-            return int(import_module(f'{PACKAGE}.nodes.framework.execution').run_node(name))
-        return int(import_module(_module(name)).main())
+        with _quiet_ctrl_c():
+            module = import_module(_module(name))
+            if _folder(name) == 'nodes':
+                module = import_module(f'{PACKAGE}.nodes.framework.execution')
+        return int(module.run_node(name) if _folder(name) == 'nodes' else module.main())
     except KeyboardInterrupt:
         return INTERRUPTED
     except ModuleNotFoundError as error:
@@ -90,6 +95,22 @@ def run(name: str) -> int:
             WITHOUT_ROS.format(name, sys.executable))
         print(f'dmp_cpg_ros: {text}', file=sys.stderr)
         return BAD_INPUT
+
+
+@contextmanager
+def _quiet_ctrl_c() -> Iterator[None]:
+    """Let Ctrl-C end the process at once: compiled modules make other errors of an exception that
+    reaches them while they are imported.
+    """
+    former = signal.getsignal(signal.SIGINT)
+    if former is not signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda *_: os._exit(INTERRUPTED))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, former)
 
 
 def __getattr__(name: str) -> Callable[[], int]:

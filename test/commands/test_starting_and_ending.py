@@ -242,20 +242,25 @@ def test_a_terminal_that_is_closed_ends_walk_in_order(
     assert (tmp_path / 'run' / 'bag' / 'metadata.yaml').is_file()
 
 
-def test_ctrl_c_while_modules_are_imported_ends_quietly(processes: Processes) -> None:
-    # The hook interrupts at the very moment at which a module of the command is imported.
+@pytest.mark.parametrize('name', ['walk', 'mujoco_robot'])
+def test_ctrl_c_while_modules_are_imported_ends_quietly(processes: Processes, name: str) -> None:
+    # The hook interrupts at the very moment at which a module of the command is imported, and
+    # makes another error of it, as compiled modules do.
     program = (
         'import os, signal, sys\n'
         'class Interrupt:\n'
         '    def find_spec(self, name, path=None, target=None):\n'
         "        if name == 'numpy':\n"
-        '            os.kill(os.getpid(), signal.SIGINT)\n'
+        '            try:\n'
+        '                os.kill(os.getpid(), signal.SIGINT)\n'
+        '            except KeyboardInterrupt:\n'
+        "                raise ImportError('initialization failed')\n"
         'sys.meta_path.insert(0, Interrupt())\n'
         # Whoever starts tests in the background of a shell may have them ignore Ctrl-C.
         'signal.signal(signal.SIGINT, signal.default_int_handler)\n'
-        "sys.argv = ['walk']\n"
-        'from dmp_cpg_ros.__main__ import walk\n'
-        'sys.exit(walk())\n')
+        f"sys.argv = ['{name}']\n"
+        f'from dmp_cpg_ros.__main__ import {name}\n'
+        f'sys.exit({name}())\n')
     process = processes.python('-c', program)
     assert process.wait() == 130
     assert process.output == ''
