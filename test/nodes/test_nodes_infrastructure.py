@@ -737,8 +737,12 @@ def ended(process: NodeProcess, status: int, *words: str) -> None:
         assert word in process.output, process
 
 
-def test_bad_arguments_end_a_process_with_status_two(processes: Processes) -> None:
+def test_bad_arguments_end_a_process_with_status_two(processes: Processes, tmp_path: Path
+                                                     ) -> None:
+    file = tmp_path / 'robot.yaml'
+    file.write_text('model: [', encoding='utf-8')
     started = [
+        (processes.node('reference_filter', robot=file), 2, (str(file), 'line 1')),
         (processes.node('reference_filter', alpha_r='.nan'), 2, ('alpha_r', 'nan', '[0.05, 50]')),
         (processes.node('reference_filter', alpha_r='fast'), 2, ('alpha_r', 'fast', 'number')),
         (processes.node('reference_filter', alpha='3.0'), 2, ("'alpha'", 'alpha_r')),

@@ -36,7 +36,7 @@ from rclpy.task import Future
 from rclpy.utilities import get_default_context, get_rmw_implementation_identifier, remove_ros_args
 
 from dmp_cpg_ros.configuration import find_config
-from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
+from dmp_cpg_ros.core.errors import DataError, DmpCpgError, MissingFileError, ParameterError
 from dmp_cpg_ros.nodes.framework.claims import claim
 from dmp_cpg_ros.nodes.framework.parameters import BATCH, NodeParameters, help_text
 from dmp_cpg_ros.suite_table import KINDS
@@ -170,7 +170,7 @@ since the signal for it [s]. Seldom, once in some thousand ends, a process waits
 OK, FAILED, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
 
-_BAD_ARGUMENTS = (ParameterError, MissingFileError, ParameterException,
+_BAD_ARGUMENTS = (ParameterError, MissingFileError, DataError, ParameterException,
                   rclpy_implementation.UnknownROSArgsError)
 
 
@@ -241,8 +241,8 @@ def run_node(kind: str) -> int:
     Returns
     -------
     int
-        Exit status: 0 after Ctrl-C or SIGTERM, 2 when a parameter or argument is bad, 1 when
-        something else failed.
+        Exit status: 0 after Ctrl-C or SIGTERM, 2 when a parameter, an argument or a file that one
+        names is bad, 1 when something else failed.
     """
     node_class = getattr(import_module(KINDS[kind].module), KINDS[kind].class_name)
     arguments = sys.argv[1:]
