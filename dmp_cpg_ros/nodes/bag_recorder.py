@@ -119,7 +119,9 @@ class BagRecorder(SuiteNode):
         is_tick = topic.name == TICK_TOPIC
 
         def receive(data: bytes) -> None:
-            if not stamped:  # it gets the time that the clock shows
+            if not self._clocks:
+                self._bag.advance(time.time_ns())
+            elif not stamped:  # it gets the time that the clock shows
                 for subscription in self._clocks:
                     drain(subscription)
             write(data)

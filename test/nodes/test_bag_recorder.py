@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import signal
+import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -191,11 +192,31 @@ def test_a_second_recording_gets_a_name_of_its_own(processes: Processes, ros: Ro
         assert (tmp_path / name / 'metadata.yaml').is_file()
 
 
+def test_without_a_topic_of_the_robot_messages_bear_the_time_of_the_day(
+        processes: Processes, ros: Ros, tmp_path: Path) -> None:
+    commands, bag = publisher(ros, 'cmd_vel'), tmp_path / 'bag'
+    process = started(processes, ros, bag, topics=['cmd_vel'])
+    recorded: list[JointState] = ros.collect(
+        JointState, 'bag_recorder/recorded', interface('~/recorded').reader_qos)
+    before_ns = time.time_ns()
+    for number in (1.0, 2.0):
+        commands.publish(Twist())
+        ros.spin_until(lambda number=number: [[number]] == [
+            [*message.position] for message in recorded[-1:]])
+    process.interrupt()
+    assert process.wait() == 0, str(process)
+    (first_ns, _), (second_ns, _) = read(bag)['/cmd_vel']
+    assert before_ns < first_ns < second_ns < time.time_ns()
+
+
 def test_an_output_that_cannot_be_made_is_refused(processes: Processes, tmp_path: Path) -> None:
     (tmp_path / 'file').touch()
     process = processes.node('bag_recorder', output=tmp_path / 'file' / 'bag')
     assert process.wait() == 2
     assert 'output' in process.output and str(tmp_path) in process.output
+    nameless = processes.node('bag_recorder', output='/')
+    assert nameless.wait() == 2 and 'Traceback' not in nameless.output, nameless
+    assert "output '/' must be" in nameless.output
 
 
 def test_a_real_time_recording_is_as_long_as_the_robot_walked(processes: Processes, ros: Ros,

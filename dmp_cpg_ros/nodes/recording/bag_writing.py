@@ -15,8 +15,9 @@ A message that comes before the clock has reached its stamp waits for it. All ot
 that the clock shows: those of users, who may stamp with the time of the day; those without a
 stamp (stamp zero of a latched topic comes from a node that knows no time yet, of others it is the
 robot's first tick); and those whose stamp is before the recording or more than ``AHEAD_NS`` ahead.
-Nothing lies outside the time of the robot. A recorder that is starved of
-processor time hears one topic seconds before another; no time of a record depends on that.
+Nothing lies outside the time of the robot; where none of its topics is recorded, that is the time
+of the day. A recorder that is starved of processor time hears one topic seconds before another; no
+time of a record depends on that.
 """
 
 from __future__ import annotations
@@ -90,7 +91,7 @@ class BagWriter:
 
     def __init__(self, folder: Path, storage: str = 'mcap') -> None:
         """Open the bag."""
-        self.folder, self.flushed = first_free(folder), 0
+        self.flushed = 0
         self.counts: dict[str, int] = {}
         self.newest_ns: int | None = None
         self._first_ns = 0
@@ -99,10 +100,11 @@ class BagWriter:
         self._numbers = count()
         self._store = get_typestore(Stores.ROS2_JAZZY)
         try:
+            self.folder = first_free(folder)
             self._writer = Writer(
                 self.folder, version=9, storage_plugin=StoragePlugin[storage.upper()])
             self._writer.open()
-        except (WriterError, OSError) as error:
+        except (WriterError, OSError, ValueError) as error:  # ValueError: it has no name
             raise ParameterError(
                 f"output '{folder}' must be a folder that can be made: {error}") from error
         self._file = getattr(self._writer.storage, 'bio', None)
@@ -143,7 +145,7 @@ class BagWriter:
                 stamp = NO_STAMP
             self.counts[topic] += 1
             if clock:
-                self._advance(stamp, anew=stamp < last - ANEW_NS)
+                self.advance(stamp, anew=stamp < last - ANEW_NS)
                 last = stamp
             self._take(stamp, connection, data)
 
@@ -166,7 +168,7 @@ class BagWriter:
     def close(self) -> None:
         """Write what still waits for a clock with the time of the day, and complete the bag."""
         if self.newest_ns is None:
-            self._advance(time.time_ns())
+            self.advance(time.time_ns())
         for stamp, _, connection, data in sorted(self._waiting, key=itemgetter(1)):
             self._write(stamp, connection, data)
         try:
@@ -176,8 +178,8 @@ class BagWriter:
         except OSError as error:
             raise RecordingError(f"cannot complete '{self.folder}': {error}") from error
 
-    def _advance(self, stamp: int, *, anew: bool = False) -> None:
-        """Set the clock; write what waited for this time."""
+    def advance(self, stamp: int, *, anew: bool = False) -> None:
+        """Set the clock [ns]; write what waited for this time."""
         waiting = self._waiting
         if self.newest_ns is None or anew:
             self._first_ns = stamp if self.newest_ns is None else min(stamp, self._first_ns)
