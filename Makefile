@@ -4,6 +4,11 @@
 # Everything runs from .venv, which is made on first use. With ROS 2 Jazzy sourced, .venv sees the
 # system's packages and uses its rclpy; without, the ros-jazzy wheels are installed into it.
 
+ifneq ($(words $(CURDIR)),1)
+  # Its rules would be about, and remove, what is named like the part before the space.
+  $(error The path '$(CURDIR)' has a space, with which make cannot work; move this folder)
+endif
+
 VENV := $(CURDIR)/.venv
 BIN := $(VENV)/bin
 

@@ -405,3 +405,14 @@ def test_the_makefile_and_ci_are_executable_as_the_readme_says() -> None:
     makefile = (ROOT / 'Makefile').read_text(encoding='utf-8')
     for target in ('help', 'demo', 'test', 'bench', 'lint', 'clean'):
         assert re.search(rf'^{target}:', makefile, re.MULTILINE)
+
+
+def test_make_touches_nothing_where_a_folder_has_a_space_in_its_name(tmp_path: Path) -> None:
+    """Its rules would be about ``my``, and remove it."""
+    clone, other = tmp_path / 'my clone', tmp_path / 'my'
+    for folder in (clone, other):
+        folder.mkdir()
+    shutil.copy(ROOT / 'Makefile', clone)
+    done = subprocess.run(['make', 'demo'], cwd=clone, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2 and f"'{clone}' has a space" in done.stderr
+    assert not done.stdout and other.exists()
