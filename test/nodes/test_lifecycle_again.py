@@ -17,8 +17,11 @@ from rosgraph_msgs.msg import Clock
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
+from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.inhibition import InhibitionNode
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
+from dmp_cpg_ros.nodes.reference_filter import ReferenceFilter
 from dmp_cpg_ros.suite_table import KINDS
 
 ros, ros_domain = ros_processes.ros, ros_processes.ros_domain
@@ -94,6 +97,24 @@ def test_what_was_wrong_before_a_node_begins_anew_is_not_told_any_more(ros: Ros)
     assert isinstance(oscillators._inhibition, Inhibition)
     oscillators._take_inhibition(late, (late, oscillators._inhibition))
     assert told().level == DiagnosticStatus.OK
+
+
+def test_a_node_that_begins_anew_is_told_what_is_latched_within_its_process(ros: Ros) -> None:
+    local = LocalDelivery(('canonical_oscillators', 'inhibition', 'mujoco_robot'))
+    reference, oscillators, inhibition = (
+        made(ros, kind) for kind in (ReferenceFilter, CanonicalOscillators, InhibitionNode))
+    for node in (reference, oscillators, inhibition):
+        node.local = local
+        node.start()
+    assert inhibition._others.newest[0] == 0
+    oscillators._take_inhibition(1, (1, oscillators._inhibition))
+    for node in (reference, inhibition):  # both have a topic ~/commands_taken
+        begin_anew(node)
+    assert inhibition._others.newest[0] == 1
+    oscillators.trigger_deactivate()
+    oscillators.trigger_cleanup()
+    begin_anew(inhibition)
+    assert inhibition._others.newest is None
 
 
 def test_a_node_is_configured_with_what_was_accepted_last(ros: Ros) -> None:

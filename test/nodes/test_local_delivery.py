@@ -40,6 +40,21 @@ def test_messages_that_callbacks_publish_wait_for_their_turn() -> None:
     assert outside.messages == ['x']
 
 
+def test_who_comes_late_gets_what_is_latched_as_long_as_its_writer_is_there() -> None:
+    local, seen = LocalDelivery(('a',)), []
+    local.latch('latched')
+    local.catch_up('latched', seen.append)
+    for message in ('first', 'last'):
+        for topic in ('latched', 'other'):
+            local.publish(topic, message)
+    for topic in ('latched', 'other'):
+        local.catch_up(topic, seen.append)
+    assert seen == ['last']
+    local.unlatch('latched')
+    local.catch_up('latched', seen.append)
+    assert seen == ['last']
+
+
 def test_an_error_does_not_leave_old_messages_behind() -> None:
     local, seen = LocalDelivery(('a',)), []
 

@@ -10,7 +10,7 @@ order of publication, one after the other; it is published to the world outside 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from functools import partial
 from typing import Any
 
@@ -36,6 +36,7 @@ class LocalDelivery:
         """Start without readers."""
         self.kinds = frozenset(kinds)
         self._readers: dict[str, list[Callable[[Any], None]]] = {}
+        self._latched: dict[str, Any] = {}
         self._queue: deque[tuple[Callable[[Any], None], Any]] = deque()
         self._busy = False
 
@@ -49,10 +50,32 @@ class LocalDelivery:
             if callback in readers:
                 readers.remove(callback)
 
+    def latch(self, topic: str) -> None:
+        """Keep the last message of a topic for readers that come late, until :meth:`unlatch`.
+
+        It is the very message: what its writer refills it publishes.
+        """
+        self._latched[topic] = None
+
+    def unlatch(self, topic: str) -> None:
+        """Keep nothing of a topic whose writer has gone."""
+        del self._latched[topic]
+
+    def catch_up(self, topic: str, callback: Callable[[Any], None]) -> None:
+        """Deliver the message that is kept of a topic, if there is one."""
+        message = self._latched.get(topic)
+        if message is not None:
+            self._deliver(message, [callback])
+
     def publish(self, topic: str, message: Any) -> None:
         """Deliver a message, after those that are under way."""
+        if topic in self._latched:
+            self._latched[topic] = message
+        self._deliver(message, self._readers.get(topic, ()))
+
+    def _deliver(self, message: Any, callbacks: Iterable[Callable[[Any], None]]) -> None:
         queue = self._queue
-        queue.extend([(callback, message) for callback in self._readers.get(topic, ())])
+        queue.extend([(callback, message) for callback in callbacks])
         if self._busy:
             return
         self._busy = True

@@ -106,6 +106,7 @@ class SuiteNode(GuardedLifecycleNode):
         self._sets: parameters.Sets = self.parameter_changes.accepted
         self._undo: list[Callable[[], object]] = []
         self._said: list[Callable[[], None]] = []
+        self._late: list[Callable[[], None]] = []
         self._not_waking: dict[str, Subscription] = {}
         self._inputs: list[tuple[Interface, Subscription]] = []
         self.writers, self._commands = TopicWriters(self), Commands(self)
@@ -215,6 +216,9 @@ class SuiteNode(GuardedLifecycleNode):
         publisher = self.create_publisher(topic.type, topic.name, qos)
         self._undo.append(partial(self.destroy_publisher, publisher))
         self._outputs.append((topic, publisher))
+        if topic.latched and self.local is not None and not topic.name.startswith('~'):
+            self.local.latch(topic.name)
+            self._undo.append(partial(self.local.unlatch, topic.name))
         return SuitePublisher(
             publisher, topic.name, self.local, self._said if repeated else None)
 
@@ -264,6 +268,8 @@ class SuiteNode(GuardedLifecycleNode):
             guarded = self.guarded(topic.name, take)
             inside.attach(topic.name, guarded)
             self._undo.append(partial(inside.detach, guarded))
+            if latched:
+                self._late.append(partial(inside.catch_up, topic.name, guarded))
             return None
         receive: Callable[..., None] = take
         informed = command or not raw and expected_count(topic.publishers) > 0
@@ -428,7 +434,12 @@ class SuiteNode(GuardedLifecycleNode):
                 self.health.status(self.state_label, values, periodic=periodic))
 
     def state_changed(self) -> None:
-        """Report a new state, and say when the node works."""
+        """Report a new state, and say when the node works; take what was latched within this
+        process before it was configured.
+        """
+        late, self._late = self._late, []
+        for catch_up in late if self.configured else ():
+            catch_up()
         if self.active:
             self.get_logger().info('active')
         self.report()
