@@ -11,9 +11,12 @@ from typing import Any
 import pytest
 import ros_processes
 from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 from ros_processes import Ros
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
@@ -37,9 +40,14 @@ def made(ros: Ros, node_class: type[SuiteNode], **parameters: Any) -> Any:
 
 def begin_anew(node: SuiteNode) -> None:
     """Through all states and back to ``active``."""
-    for transition in (node.trigger_deactivate, node.trigger_cleanup):
-        transition()
+    clean_up(node)
     node.start()
+
+
+def clean_up(node: SuiteNode) -> None:
+    """From ``active`` to ``unconfigured``."""
+    for transition in (node.trigger_deactivate, node.trigger_cleanup):
+        assert transition() == TransitionCallbackReturn.SUCCESS
 
 
 @pytest.mark.parametrize(('kind', 'lock_step'), [
@@ -64,8 +72,7 @@ def test_a_node_that_begins_anew_leaves_nothing_behind(
     for _ in range(3):
         begin_anew(node)
         assert entities() == active
-    node.trigger_deactivate()
-    node.trigger_cleanup()
+    clean_up(node)
     assert entities() == idle
 
 
@@ -81,6 +88,30 @@ def test_a_robot_whose_gate_is_open_goes_on_when_it_is_activated_again(ros: Ros)
         ros.spin_until(lambda then=then: robot.health.stamp_ns > then)
         robot.trigger_deactivate()
         robot.trigger_activate()
+
+
+@pytest.mark.parametrize('node_class', [ReferenceFilter, InhibitionNode])
+def test_what_was_due_when_a_node_was_cleaned_up_harms_nobody(
+        ros: Ros, node_class: type[SuiteNode]) -> None:
+    """Messages and requests that an executor had taken already."""
+    node = made(ros, node_class)
+    node.start()
+    node._joined = True
+    subscriptions, services = list(node._subscriptions), list(node.services)
+    clean_up(node)
+    for subscription in subscriptions:
+        message = subscription.msg_type()
+        if isinstance(message, String):
+            message.data = 'lie'
+        information = {'publication_sequence_number': 1, 'received_timestamp': 1}
+        numbered = type(subscription).CallbackType.WithMessageInfo
+        subscription.callback(serialize_message(message), *(
+            [information] if subscription._callback_type is numbered else []))
+    assert node.health.rejected == {}
+    gone = [service for service in services if service not in list(node.services)]
+    for service in gone:
+        service.send_response(service.srv_type.Response(), None)
+    assert bool(gone) == (node_class is InhibitionNode)
 
 
 def test_what_was_wrong_before_a_node_begins_anew_is_not_told_any_more(ros: Ros) -> None:
@@ -109,10 +140,10 @@ def test_a_node_that_begins_anew_is_told_what_is_latched_within_its_process(ros:
     assert inhibition._others.newest[0] == 0
     oscillators._take_inhibition(1, (1, oscillators._inhibition))
     for node in (reference, inhibition):  # both have a topic ~/commands_taken
-        begin_anew(node)
+        clean_up(node)
+    inhibition.start()
     assert inhibition._others.newest[0] == 1
-    oscillators.trigger_deactivate()
-    oscillators.trigger_cleanup()
+    clean_up(oscillators)
     begin_anew(inhibition)
     assert inhibition._others.newest is None
 

@@ -46,8 +46,9 @@ class Commands:
             try:
                 callback(message)
             finally:
-                counts[topic] += 1
-                self._publisher.publish(counts_message(counts))
+                if self._topics:  # else it was due when the node was cleaned up
+                    counts[topic] += 1
+                    self._publisher.publish(counts_message(counts))
 
         return self._node.writers.numbered(topic, receive)
 

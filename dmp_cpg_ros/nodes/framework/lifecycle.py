@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.service import Service
@@ -242,6 +243,13 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
         who = partial(self.strangers.asking, srv_name)
         service = super().create_service(
             srv_type, srv_name, self.guarded(srv_name, callback, who), *arguments, **options)
+        send = service.send_response
+
+        def answer(response: Any, header: Any) -> None:
+            with contextlib.suppress(InvalidHandle):  # destroyed while its request was waiting
+                send(response, header)
+
+        service.send_response = answer
         sends_later(service)
         return service
 

@@ -261,7 +261,7 @@ class SuiteNode(GuardedLifecycleNode):
         latched, read = topic.latched, serialized_reader(topic.type, as_message=command)
 
         def take(message: Any) -> None:
-            if self.active or latched:
+            if self.active or (latched and self.configured):
                 callback(message if raw or inside else read(message))
 
         if inside is not None:

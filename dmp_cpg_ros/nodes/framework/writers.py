@@ -151,7 +151,7 @@ class TopicWriters:
         self._watches[topic.name] = watches
 
         def receive(data: Any, information: Any = None) -> None:
-            if not (node.active or latched):
+            if not (node.active or (latched and node.configured)):
                 return
             data, number, now_ns = with_number(data, information)
             stamp_ns = serialized_stamp(data) if ticked else 0
