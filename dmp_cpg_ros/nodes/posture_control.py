@@ -213,10 +213,6 @@ class PostureControl(SuiteNode):
         for what in REQUESTS:
             self.serve(what, partial(self._take_request, what))
 
-    def activate(self) -> None:
-        """Tell late joiners the mode from the start."""
-        self._tell()
-
     def on_parameters(self) -> None:
         """Take over the gains."""
         self._control = self._control.with_posture(self.parameters_of(PostureParameters))
@@ -258,7 +254,9 @@ class PostureControl(SuiteNode):
             self._state, read_drive_mode(message))
 
     def _tell(self) -> None:
-        """Publish and log a new mode; a fall is an error until it is over."""
+        """Publish and log a new mode, the first at a tick, which shows how the robot is found; a
+        fall is an error until it is over.
+        """
         mode, reason = self._state.mode.mode, self._state.mode.reason
         if mode == self._told:
             return

@@ -25,6 +25,7 @@ from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
 from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
+from dmp_cpg_ros.nodes.posture_control import PostureControl
 from dmp_cpg_ros.nodes.reference_filter import ReferenceFilter
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.suite import load_suite
@@ -263,6 +264,24 @@ def test_a_leg_without_feedback_of_the_posture_says_nothing(ros: Ros) -> None:
             'posture_feedback': (state.time_ns - age, tick.feedback)})
         assert bool(sent) != silent and leg.health.has_problem('feedback') == silent
     leg.destroy_node()
+
+
+def test_a_posture_control_that_comes_back_tells_no_mode_before_it_knows_it(ros: Ros) -> None:
+    """Else a robot that lies would count as fallen."""
+    posture, modes = PostureControl(context=ros.context, parameter_overrides=[
+        Parameter('state_source', value='ground_truth')]), []
+    ros.nodes.append(posture)
+    posture.trigger_configure()
+    posture._mode_publisher.publish = lambda message: modes.append(message.data)
+    posture.trigger_activate()
+    robot = PerfectTrackingRobot(load_description(SUITE.robot_file), TICK, 'lying')
+    state, tick = robot.reset(1000 * TICK), walked(1)[2]
+    posture.on_tick(state.time_ns, {
+        'joint_states': (state.joint_position, state.joint_velocity, state.joint_effort),
+        'ground_truth': (state.base_position_in_world, state.base_quaternion,
+                         state.base_velocity_in_base, state.base_rate_in_base),
+        'canonical_state': (tick.x, tick.x_dot, tick.gait), 'reference': tick.r})
+    assert modes == ['lying']
 
 
 def test_a_robot_in_lock_step_tells_a_tick_again_that_does_not_end(ros: Ros) -> None:
