@@ -594,13 +594,14 @@ def test_targets_from_the_future_do_not_hold_the_robot(robot: MujocoRobotNode) -
 
 def test_a_leg_tells_the_gait_that_it_follows(ros: Ros) -> None:
     """The parameter is what is in force, and who asks for another one is sent to its owner."""
-    node = LegTransformation('leg', context=ros.context)
+    node = LegTransformation('leg', namespace='/robot1', context=ros.context)
     node.start()
     follow_gait(node, known_gaits(node).gaits['trot'].scaled(1.25))
     assert node.get_parameter('gait').value == 'trot'
     result = node.set_parameters([Parameter('gait', value='amble')])[0]
     assert not result.successful
     assert 'belongs to canonical_oscillators' in result.reason
+    assert 'param set /robot1/canonical_oscillators gait' in result.reason
     assert node.get_parameter('gait').value == 'trot'
     node.close()
     node.destroy_node()

@@ -142,7 +142,7 @@ class ParameterChanges:
 
     def _check(self, changes: list[Parameter]) -> SetParametersResult:
         """Validate changes together with the values that were accepted last."""
-        kind = self._node.KIND
+        kind, space = self._node.KIND, self._node.get_namespace().rstrip('/')
         try:
             sets = self._changed(changes)
             for name, value in self.between(sets).items() if not self.following else ():
@@ -150,7 +150,7 @@ class ParameterChanges:
                 if owner != kind:
                     raise ParameterError(
                         f"'{name}' belongs to {owner}, which the other nodes follow; set it "
-                        f'there: ros2 param set /{owner} {name} {typed(value)}')
+                        f'there: ros2 param set {space}/{owner} {name} {typed(value)}')
             self._node.check_parameters(sets)
         except DmpCpgError as error:
             return SetParametersResult(successful=False, reason=str(error))
