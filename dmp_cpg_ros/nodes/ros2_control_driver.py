@@ -90,7 +90,7 @@ class Ros2ControlDriver(DrivenRobot):
         self._feet = [(-FRESH_NS, np.nan)] * len(LEGS)
         self._state = self._state_at(-1, np.zeros((3, 12)))
         self._enabled = self._commanding = False
-        self._seen = 0
+        self._seen = self.health.ticks
         sensors: dict[str, Callable[[Any], None]] = {
             f'{JOINT_BROADCASTER}/joint_states': self._on_joints,
             f'{IMU_BROADCASTER}/imu': self._on_imu,
@@ -136,6 +136,7 @@ class Ros2ControlDriver(DrivenRobot):
         if last >= 0 and not 0 < stamp - last <= AHEAD_NS:       # the robot's clock was set
             self.forget_targets()
         self._state = self._state_at(stamp, measured)
+        self.clear('states')
         if stamp // self._tick_ns != last // self._tick_ns:
             self._tick(stamp - stamp % self._tick_ns)
         if self._commanding:
@@ -167,8 +168,6 @@ class Ros2ControlDriver(DrivenRobot):
         if self.health.ticks == self._seen:
             self.warn('states', f'no {JOINT_BROADCASTER}/joint_states of the joints '
                       f'{", ".join(self._description.joint_names)}: nothing is commanded')
-        else:
-            self.clear('states')
         self._seen = self.health.ticks
 
     # What is commanded ---------------------------------------------------------------------------
@@ -208,7 +207,8 @@ class Ros2ControlDriver(DrivenRobot):
                 if self._commanding else 'nothing is commanded')
         stamp, quaternion, *_ = self._imu
         now = self._state.time_ns
-        if now < 0 or quaternion is None or not fresh(stamp, now, FRESH_NS):
+        if now < 0 or quaternion is None or not fresh(stamp, now, FRESH_NS) or (
+                self.health.has_problem('states')):
             return False, ('joint states and an IMU with its orientation are needed first: '
                            'without them nobody knows whether the robot stands')
         if not self._commanding:

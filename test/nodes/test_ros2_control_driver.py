@@ -39,6 +39,7 @@ class Bench:
         self.driver = Ros2ControlDriver(context=ros.context, parameter_overrides=[
             Parameter('command_interfaces', value=list(interfaces))])
         self.driver.start()
+        self.driver._timer.cancel()  # states come when the test tells them
         ros.nodes.append(self.driver)
         ros.executor.add_node(self.driver)
         self.legs = ros.node.create_publisher(JointState, 'joint_targets', 100)
@@ -97,6 +98,18 @@ def test_nothing_is_commanded_before_it_is_enabled_and_enabling_needs_an_imu(ros
         held = made.robot.command['position']
         assert np.allclose(held, made.robot.state.joint_position, atol=1e-3)
         assert 'belly' in made.enable().message
+
+
+def test_joint_states_that_have_fallen_silent_do_not_enable(ros: Ros) -> None:
+    with bench(ros, 'position') as made:
+        made.told()
+        for _ in range(2):
+            made.driver._look_for_states()
+        answer = made.enable()
+        assert not answer.success and 'joint states' in answer.message
+        made.robot.step()
+        made.told()
+        assert made.enable().success
 
 
 def test_torques_alone_bring_the_robot_to_its_belly_and_keep_their_limits(ros: Ros) -> None:
