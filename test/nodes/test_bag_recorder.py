@@ -107,7 +107,7 @@ def test_a_stopped_recorder_has_every_byte(processes: Processes, ros: Ros, tmp_p
     assert {profile.reliability.name for profile in offered.values()} == {'RELIABLE'}
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_second_signal_does_not_break_into_the_end_of_a_recording(
         processes: Processes, tmp_path: Path, number: int) -> None:
     """Under launch a node gets the Ctrl-C of the terminal and that of launch."""

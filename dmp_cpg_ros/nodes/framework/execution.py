@@ -241,8 +241,8 @@ def run_node(kind: str) -> int:
     Returns
     -------
     int
-        Exit status: 0 after Ctrl-C or SIGTERM, 2 when a parameter, an argument or a file that one
-        names is bad, 1 when something else failed.
+        Exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 when a parameter, an argument or a file
+        that one names is bad, 1 when something else failed.
     """
     node_class = getattr(import_module(KINDS[kind].module), KINDS[kind].class_name)
     arguments = sys.argv[1:]
@@ -328,7 +328,8 @@ def _status(program: str, body: Callable[[], object]) -> int:
 
 
 def _first_signal() -> Future:
-    """Return a future that SIGINT or SIGTERM completes; nothing else comes of them.
+    """Return a future that SIGINT, SIGTERM or SIGHUP, of a terminal that is closed, completes;
+    nothing else comes of them.
 
     rclpy's handler would end the context under callbacks that still run, and Python's would raise
     in one of them; a second Ctrl-C must not break into what is being completed: a recording.
@@ -339,8 +340,9 @@ def _first_signal() -> Future:
     # Python runs handlers between two of its own instructions, of which a waiting executor
     # executes none; the byte is written at once.
     signal.set_wakeup_fd(writable, warn_on_full_buffer=False)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: None)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:  # as by nohup
+            signal.signal(number, lambda *_: None)
 
     def wait() -> None:
         os.read(readable, 1)
