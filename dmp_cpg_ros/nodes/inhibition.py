@@ -222,7 +222,8 @@ class InhibitionNode(SuiteNode):
         self._joined, self._began_ns = True, stamp_ns
         if stamp_ns > 0:
             unknown = replace(self._supervisor.inhibition(self._state), automatic=False)
-            self._state = adopted(self._others.known or unknown, stamp_ns)
+            self._state = adopted(
+                self._others.known or unknown, stamp_ns, self._supervisor.parameters)
             self._acting = self._supervisor.inhibition(self._state)
             if self._state.requested:
                 self._predict()

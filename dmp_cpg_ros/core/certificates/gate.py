@@ -158,18 +158,17 @@ class Running:
         x : ndarray (4, 2)
             States.
         """
-        acting = inhibition.gains
+        acting = network.acting_gains(inhibition, x)
         served = before.parameters.inhibition.gains_on(int(acting.argmax())) > 0.0
         # the service's gain is above that of any vote, whatever it was when it was asked for
         voted = bool(acting[served].min(initial=math.inf) <= acting[~served].max(initial=0.0))
         names = sorted((_CAPTURING | {'cadence_scale'} if voted else _CAPTURING)
                        & before.differences(self).keys())
-        if not (names and inhibition.requested
-                and network.acting_gains(inhibition, x).any()):
+        if not (names and inhibition.requested and acting.any()):
             return ''
         if voted:
             return (f'{", ".join(names)} cannot change while votes alone hold the legs; ask again '
-                    'while the gait runs or is stopped by the service')
+                    "while the gait runs or the service's stop holds it")
         if not inhibition.at_rest:
             return (f'{", ".join(names)} cannot change while the legs are being captured; ask '
                     'again when they are at rest')

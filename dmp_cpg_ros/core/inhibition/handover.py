@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
@@ -14,11 +14,15 @@ from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 
-def adopted(acting: Inhibition, time_ns: int) -> SupervisorState:
+def adopted(acting: Inhibition, time_ns: int, parameters: InhibitionParameters
+            ) -> SupervisorState:
     """State of a supervisor that comes to a gait on which an inhibition acts.
 
     A stop that was requested stays requested, and what ends it stays the same; a gait that runs
-    goes on. Where in a stop or a start the gait is shows itself within a few ticks.
+    goes on. Inhibition that is armed stays so, because legs that are held are no longer in the
+    places in which they may be caught, and gains above the service's are those of votes, of which
+    the service's leg need not be within its region. Where else in a stop or a start the gait is
+    shows itself within a few ticks.
 
     Parameters
     ----------
@@ -26,14 +30,18 @@ def adopted(acting: Inhibition, time_ns: int) -> SupervisorState:
         What acts on the oscillators.
     time_ns : int
         Stamp of the tick before the first [ns].
+    parameters : InhibitionParameters
+        Gains that the service's stop has.
     """
-    stop = acting.requested
+    stop, gains, leg = acting.requested, acting.gains, int(np.argmax(acting.gains))
     word = ('at_rest' if acting.at_rest else 'waiting') if stop else 'releasing'
+    voted = stop and bool(np.any(gains > parameters.gains_on(leg)))
     return SupervisorState(
-        time_ns, word, stop, acting.automatic, time_ns, acting.at_rest,
+        time_ns, word, stop, acting.automatic, time_ns, stop and bool(gains.any()),
         np.full(len(LEGS), 0.0 if acting.at_rest else 1.0),
-        measured_s=0.0 if acting.at_rest else float('nan'), asked=stop,
-        leg=int(np.argmax(acting.gains)), rest_phase=acting.rest_phase, quickness=acting.quickness)
+        measured_s=0.0 if acting.at_rest else float('nan'), asked=stop, voted=voted,
+        vote_gains=gains if voted else np.zeros(len(LEGS)), leg=leg,
+        rest_phase=acting.rest_phase, quickness=acting.quickness)
 
 
 class SilentStop:
@@ -53,7 +61,8 @@ class SilentStop:
         """Request the stop; a service's stop stays one."""
         self._supervisor = supervisor
         self._state = supervisor.request(
-            adopted(acting, time_ns), True, acting.automatic or not acting.requested)
+            adopted(acting, time_ns, supervisor.parameters), True,
+            acting.automatic or not acting.requested)
 
     @property
     def inhibition(self) -> Inhibition:

@@ -238,13 +238,15 @@ class GaitSupervisor:
 
     def _voted(self, state: SupervisorState, tally: Tally, network: GaitNetwork
                ) -> SupervisorState:
-        """Stop when votes overcome the threshold; keep what holds until it is released."""
+        """Stop when votes overcome the threshold; keep what holds until it is released, also while
+        the service asks for the stop: its leg need not be where it could hold the others.
+        """
         if tally is not state.tally:
             state = replace_unchecked(state, tally=tally)
         if not state.voted:
             return self._turned(replace_unchecked(
                 state, voted=True, vote_gains=tally.gains)) if tally.stops else state
-        if not tally.alive and self.voting.vote_resume:
+        if not (tally.alive or state.asked) and self.voting.vote_resume:
             return self._turned(replace_unchecked(state, voted=False))
         gains = state.vote_gains
         if self.voting.vote_rule == SUM and np.any(tally.gains > gains):

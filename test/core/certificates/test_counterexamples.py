@@ -11,6 +11,7 @@ import pytest
 from core_examples import TICK, quadruped
 
 from dmp_cpg_ros.core.canonical.phase import phase
+from dmp_cpg_ros.core.inhibition.handover import adopted
 from dmp_cpg_ros.studies.oscillator_loop import Oscillators
 
 ROBOT = quadruped()
@@ -41,6 +42,12 @@ class Walk:
         self.loop.command(speed)
         self.loop.request(False)
         self.run(seconds)
+
+    def hand_over(self) -> None:
+        """Let another one watch the stop from now on, who has heard no votes."""
+        loop = self.loop
+        loop.votes = loop.voting.initial_state(loop.network)
+        loop.stop = adopted(loop.inhibition, loop.now_ns, loop.supervisor.parameters)
 
     def stop(self) -> tuple[float, float, float]:
         """Stop: bound, prediction and what it took [s]; C is not left once it is entered."""
@@ -168,3 +175,47 @@ def test_stops_within_starts_keep_the_bound_that_is_stated(seed: int) -> None:
         walk.walk(0.4, rng.uniform(0.004, 0.6))
         bound, predicted, measured = walk.stop()
         assert measured == pytest.approx(predicted, abs=1e-9) and measured <= bound
+
+
+@pytest.mark.parametrize('wait', [0.02, 0.1, 0.2])
+@pytest.mark.parametrize(('graph', 'gain'), [('path', 60.0), ('all_to_all', 30.0)])
+def test_legs_that_are_held_are_not_let_go_by_who_takes_the_stop_over(
+        graph: str, gain: float, wait: float) -> None:
+    walk = Walk(coupling_graph=graph, coupling_gain=gain, capture_speed=1.0, alpha_r=10.0)
+    walk.walk(0.5, 2.0)
+    walk.loop.request(True)
+    while walk.loop.stop.state != 'captured':
+        walk.tick()
+    walk.run(wait)
+    walk.turned[:] = 0.0
+    walk.hand_over()
+    walk.run(1.5)
+    assert walk.loop.stop.state == 'at_rest'
+    assert walk.left_region == 0 and np.abs(walk.turned).max() < np.radians(90.0)
+
+
+VOTED = {'coupling_graph': 'ring', 'coupling_gain': 40.0, 'voting': True, 'silence_weight': 0.0,
+         'vote_fade': 4.0}
+"""With which three legs hold the fourth outside of its region."""
+
+
+@pytest.mark.parametrize('resume', [False, True])
+@pytest.mark.parametrize('taken_over', [False, True])
+def test_legs_that_votes_hold_are_not_let_go_by_who_asks_for_the_stop_too(
+        resume: bool, taken_over: bool) -> None:
+    walk = Walk(**VOTED, vote_resume=resume)
+    walk.walk(0.3, 2.0)
+    walk.loop.vote(dict.fromkeys(('fr', 'rl', 'rr'), 10.0))
+    walk.run(2.0)
+    assert walk.loop.stop.state == 'at_rest' and not walk.loop.stop.asked
+    walk.turned[:] = 0.0
+    if taken_over:
+        walk.hand_over()
+    else:
+        walk.loop.request(True)
+    walk.run(8.0)                                            # the votes have faded
+    assert not walk.loop.stop.tally.alive and walk.loop.stop.state == 'at_rest'
+    assert np.abs(walk.turned).max() < np.radians(30.0)
+    assert 'votes alone hold' in walk.loop.change({'cadence_scale': 1.5})
+    walk.walk(0.3, 1.0)
+    assert walk.loop.stop.state == 'walking'

@@ -42,7 +42,8 @@ def test_a_stop_by_the_service_stays_one_whatever_is_commanded() -> None:
     loop.request(True)
     state = go(loop, robot, state, 600)
     assert loop.stop.state == 'at_rest'
-    loop.stop = adopted(loop.inhibition, state.time_ns)  # as a restarted node would begin
+    loop.stop = adopted(  # as a restarted node would begin
+        loop.inhibition, state.time_ns, loop.supervisor.parameters)
     state = go(loop, robot, state, 600)
     assert loop.stop.state == 'at_rest' and loop.stop.requested
     loop.request(False)
@@ -55,7 +56,8 @@ def test_a_stop_under_way_is_carried_on() -> None:
     loop.request(True)
     state = go(loop, robot, state, 50)
     assert loop.stop.state == 'waiting'
-    loop.stop = adopted(loop.inhibition, state.time_ns)
+    loop.stop = adopted(
+        loop.inhibition, state.time_ns, loop.supervisor.parameters)
     go(loop, robot, state, 600)
     assert loop.stop.state == 'at_rest'
 
@@ -63,7 +65,8 @@ def test_a_stop_under_way_is_carried_on() -> None:
 def test_a_gait_that_runs_is_not_touched() -> None:
     loop, robot, state = walking()
     phases = loop.network.phase_errors(loop.x)
-    loop.stop = adopted(loop.inhibition, state.time_ns)
+    loop.stop = adopted(
+        loop.inhibition, state.time_ns, loop.supervisor.parameters)
     for _ in range(200):
         state = go(loop, robot, state, 1)
         assert not loop.stop.requested and not loop.inhibition.gains.any()

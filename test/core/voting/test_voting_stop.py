@@ -139,8 +139,10 @@ def test_a_stop_that_was_also_asked_for_outlasts_the_votes() -> None:
     vote(run, LEGS, 0.3)
     run.loop.request(True)
     run.go(3.0)
-    assert run.loop.stop.state == 'at_rest' and not run.loop.stop.voted
-    assert np.array_equal(run.loop.inhibition.gains, run.loop.parameters.inhibition.armed_gains)
+    assert run.loop.stop.state == 'at_rest' and not run.loop.stop.tally.alive
+    assert np.all(run.loop.inhibition.gains >= run.loop.parameters.inhibition.armed_gains)
+    run.loop.request(False)
+    run.until('walking')
 
 
 def test_votes_of_a_minority_leave_a_requested_stop_as_it_is() -> None:
