@@ -245,12 +245,12 @@ class WalkingLoop:
         wanted = named(values.get('gait', canon.wanted.name))
         present = self._described(self.parameters, canon.wanted)
         proposed = self._described(present.changed(values).parameters, wanted)
-        leading_to = named(canon.leading_to.name)
+        walked = [named(end.name) for end in canon.gait.ends]
         waits = proposed.refused_now(present, self.network, self.inhibition, self.x)
         if waits:
             return waits
         verdict = Change(present, present.settled.certificate(), proposed,
-                         (leading_to, canon.wanted, wanted)).verdict()
+                         (*walked, canon.wanted)).verdict()
         if verdict.accepted:
             p = proposed.parameters
             self._take(p, wanted)

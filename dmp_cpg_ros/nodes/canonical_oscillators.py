@@ -136,7 +136,7 @@ class CanonicalOscillators(SuiteNode):
         return Acting(
             state.cadence_scale,
             (self._canonical.network(state.gait), self._inhibition, state.x),
-            (state.leading_to, state.wanted))
+            (*state.gait.ends, state.wanted))
 
     def _watch_phases(self, network: GaitNetwork, r: Any, dt: float) -> None:
         """Compare the phases with their bound; an alarm is published at once."""

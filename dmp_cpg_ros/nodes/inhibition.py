@@ -280,7 +280,8 @@ class InhibitionNode(SuiteNode):
     def _acting_now(self) -> Acting:
         if self._x is None:
             return Acting()
-        return Acting(self._slow.gait.cadence_scale, (self._network, self._acting, self._x))
+        gait = self._slow.gait
+        return Acting(gait.cadence_scale, (self._network, self._acting, self._x), gait.ends)
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """State of the stop."""

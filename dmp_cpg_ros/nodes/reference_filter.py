@@ -18,6 +18,7 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import REFERENCE
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified
 from dmp_cpg_ros.nodes.framework.gait_memory import GaitMemory
+from dmp_cpg_ros.nodes.framework.gaits import WalkedGaits
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
@@ -36,7 +37,8 @@ class ReferenceFilter(SuiteNode):
 
     def configure(self) -> None:
         """Build the filter and its topics."""
-        self.certified = Certified(self, lambda: Acting(self._cadence))
+        self.certified = Certified(
+            self, lambda: Acting(self._cadence, gaits=self._walked.gaits))
         self._system = self.certified.reference()
         self._r = np.zeros(3)
         self._inhibition = Inhibition(False, np.zeros(len(LEGS)), 1.0)
@@ -47,9 +49,11 @@ class ReferenceFilter(SuiteNode):
                    delayed={'inhibition_gains': stamped(gains.read)})
         self._memory = GaitMemory(self, self.certified.gaits)
         self._gate = self.certified.commands()
+        self._walked = WalkedGaits(self, self.certified.gaits)
 
     def on_parameters(self) -> None:
         """Take over limits and rates."""
+        self._walked.follow()
         self.certified.limit(self._gate)
         self._system = self.certified.reference()
 

@@ -88,6 +88,45 @@ def test_the_robot_walks_on_when_a_change_is_refused_and_when_it_is_accepted(
             getattr(recording.targets, name), [getattr(tick.targets, name) for tick in ticks])
 
 
+HANDED_OVER = """\
+name: handed_over
+duration: 6.5
+events:
+  - {at: 0.1, inhibit: false}
+  - {at: 0.1, command: {v_x: 0.4}}
+  - {at: 1.0, set: {max_speed: 0.4, max_lateral_speed: 0.0, max_turn_rate: 0.0}}
+  - {at: 1.5, set: {inhibition_gain: 328.0}}
+  - {at: 2.0, gait: amble}
+  - {at: 2.0, set: {max_speed: 3.5}}
+  - {at: 2.0, set: {inhibition_gain: 250.0}}
+  - {at: 2.1, set: {max_speed: 3.5}}
+  - {at: 2.1, set: {inhibition_gain: 250.0}}
+  - {at: 4.5, set: {max_speed: 3.5}}
+  - {at: 4.5, set: {inhibition_gain: 250.0}}
+  - {at: 4.8, inhibit: true}
+"""
+
+
+@pytest.mark.parametrize('shared', ['--composed', '--processes=each'])
+def test_no_node_accepts_what_the_gait_that_is_still_walked_does_not_bear(
+    processes: Processes, tmp_path: Path, shared: str
+) -> None:
+    settings = {'physics': 'perfect_tracking', 'gait': 'bound', 'control_rate': SHARED_HZ}
+    process = processes.walk(
+        HANDED_OVER, tmp_path / 'run', '--lock-step', shared, *(
+            item for name, value in settings.items() for item in ('--set', f'{name}:={value}')))
+    assert process.wait(RUN_S) == 0, str(process)
+    refusals = re.findall(r'refused: (.*)', process.output)
+    assert len(refusals) == 4 and process.output.count('accepted') == 5, process.output
+    for refusal in refusals:
+        assert re.search('changes among .* not certified: capture.*; ask again when', refusal)
+    plain = tmp_path / 'plain.yaml'
+    plain.write_text(HANDED_OVER, encoding='utf-8')
+    recording, (_, ticks) = load_recording(tmp_path / 'run' / 'bag'), plain_run(plain, **settings)
+    assert ticks[-1].supervisor.state == 'at_rest'
+    np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
+
+
 def set_parameters(ros: Ros, node: str, **values: Any) -> Any:
     """``ros2 param set``: the result of the first parameter."""
     request = SetParameters.Request(parameters=[

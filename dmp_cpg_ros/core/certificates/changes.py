@@ -98,25 +98,26 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
     return replace(whole, inequalities=tuple(rows), time_to_rest=bound)
 
 
-def refused_change(parameters: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,
-                   tick_s: float, acting_cadence: float | None = None) -> str:
-    """Why changes among some gaits are refused; empty when they are certified.
+def refused_change(parameters: SuiteParameters, walked: Sequence[Gait], wanted: Sequence[Gait],
+                   scale: BodyScale, tick_s: float, acting_cadence: float | None = None) -> str:
+    """Why parameters may not act while what is walked changes into what is wanted; empty when
+    they are certified for it, or nothing else is walked.
 
     Parameters
     ----------
     parameters, scale, tick_s, acting_cadence
         As for :func:`certify_changes`.
-    gaits : sequence of Gait
+    walked, wanted : sequence of Gait
         Gaits; one that stands twice counts once.
     """
-    different = list({gait.name: gait for gait in gaits}.values())
-    if len(different) < 2:
+    among = list({gait.name: gait for gait in (*walked, *wanted)}.values())
+    if len(among) == len(wanted):
         return ''
-    certificate = certify_changes(parameters, different, scale, tick_s, acting_cadence,
+    certificate = certify_changes(parameters, among, scale, tick_s, acting_cadence,
                                   required_only=True)
     if certificate.holds:
         return ''
-    return (f'changes among {", ".join(gait.name for gait in different)} are not certified: '
+    return (f'changes among {", ".join(gait.name for gait in among)} are not certified: '
             f'{certificate.explained()}')
 
 

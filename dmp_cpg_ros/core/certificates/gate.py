@@ -269,7 +269,7 @@ class Change:
     proposed : Running
         What is asked for.
     gaits : tuple of Gait
-        Gaits among which the change changes, from the one that is walked on; may repeat.
+        Walked until those of ``proposed`` are, both ends of a change included; may repeat.
     """
 
     present: Running
@@ -278,17 +278,17 @@ class Change:
     gaits: tuple[Gait, ...] = ()
 
     def verdict(self) -> Verdict:
-        """Judge: accepted when every required inequality holds, or, where the running parameters
-        have no certificate to lose, when none gets worse.
-        """
-        certificate, settled = self.proposed.certificate(), self.proposed.settled.certificate()
-        refused = self.gaits and refused_change(
-            self.proposed.parameters, self.gaits, self.proposed.scale, self.proposed.tick_s,
-            self.proposed._of_certificate.acting_cadence)
-        if refused:
-            return Verdict(certificate, settled, False, refused)
+        """Judge: accepted when no required inequality is lost, nor gets worse where it fails."""
+        of, before = self.proposed, self.present
+        certificate, settled = of.certificate(), of.settled.certificate()
+        refused = refused_change(of.parameters, self.gaits, (of.gait, *of.others), of.scale,
+                                 of.tick_s, of._of_certificate.acting_cadence)
         lost = [entry for entry in certificate.failing
                 if self.held[entry.name].holds or entry.margin < self.held[entry.name].margin]
+        same = (of.gait, of.others) == (before.gait, before.others)
+        if refused and not (same and lost):
+            refused += '; ask again when the gait has changed' * same
+            return Verdict(certificate, settled, False, refused)
         if not lost:
             return Verdict(certificate, settled, True)
         reason = ' | '.join(entry.explained() for entry in lost)

@@ -183,11 +183,6 @@ class CanonicalState:
     x_dot: Array
     contact: contacts.ContactState
 
-    @property
-    def leading_to(self) -> Gait:
-        """The gait in force, or the one that the present change leads to."""
-        return self.gait.ends[-1]
-
 
 class RunningGait:
     """The canonical block; state in, state out.

@@ -66,7 +66,7 @@ class Acting(NamedTuple):
     stop : (GaitNetwork, Inhibition, ndarray (4, 2)) or None
         Network, inhibition and states of the last tick.
     gaits : tuple of Gait
-        Of the node that owns the gait: the one that it walks or comes to, and the one it wants.
+        That are walked, both ends of a change between two, and wanted.
     """
 
     cadence: float | None = None
@@ -223,7 +223,7 @@ class Certified:
         if not node.configured:
             return None
         changed = node.parameter_changes.between(sets)
-        gaits = self._changing_gaits(sets)
+        gaits = self._walked_gaits(sets)
         if not changed or gate.UNCERTIFIED.issuperset(changed):
             return None
         proposed = self._running(sets)
@@ -251,24 +251,22 @@ class Certified:
         farther = max(now, soon, key=lambda cadence: abs(cadence - wanted))
         return replace(change, proposed=replace(change.proposed, acting_cadence=farther))
 
-    def _changing_gaits(self, sets: Sets) -> tuple[Gait, ...]:
-        """Gaits among which a change of the gait changes, the one that is walked included; empty
-        where it does not change. Raises ParameterError for one that there is not.
+    def _walked_gaits(self, sets: Sets) -> tuple[Gait, ...]:
+        """Gaits that are walked until those that are asked for are; raises ParameterError for one
+        that there is not, or that nobody may ask for now.
         """
-        walked, named = self._acting().gaits, self.gaits.named
+        named, accepted = self.gaits.named, self._accepted
         name, choice = sets[suite.GaitParameters].gait, sets[GaitChoiceParameters]
-        asked = name != self._accepted[suite.GaitParameters].gait
-        chosen = choice.auto_gait and choice != self._accepted[GaitChoiceParameters]
-        if not walked or not (asked or chosen):
-            return ()
-        if asked:
+        before, chose = accepted[suite.GaitParameters].gait, accepted[GaitChoiceParameters]
+        if name != before:
             named(name)
             if choice.auto_gait:
                 raise ParameterError(
                     f"gait = '{name}' cannot be set while auto_gait chooses among "
                     f'{", ".join(choice.auto_gaits)}; set auto_gait to false first')
-        news = choice.auto_gaits if chosen else (name,)
-        return tuple(named(gait) for gait in (*(gait.name for gait in walked), *news))
+        names = [gait.name for gait in self._acting().gaits]
+        names += chose.auto_gaits if chose.auto_gait else (before,)
+        return tuple(map(named, names))
 
     def accept(self) -> None:
         """Take over what :meth:`check` has let pass, and tell of the certificate."""

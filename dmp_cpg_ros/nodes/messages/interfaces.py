@@ -177,8 +177,8 @@ TOPICS: tuple[Interface, ...] = (
               sometimes=(VISUALIZATION,)),
     Interface('canonical_state', JointState,
               'oscillators, shares of gaits, cadence: position = state, velocity = its rate',
-              (CANONICAL,), (LEG, INHIBITION, POSTURE, VISUALIZATION),
-              sometimes=(VISUALIZATION,)),
+              (CANONICAL,), (REFERENCE, LEG, INHIBITION, POSTURE, VISUALIZATION),
+              sometimes=(REFERENCE, VISUALIZATION)),
     Interface('posture_feedback', JointState,
               'balance: torques, measured angles, shift, drift and forces of the feet; '
               "the body's mode and the phase of its movement",

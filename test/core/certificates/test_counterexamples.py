@@ -219,3 +219,18 @@ def test_legs_that_votes_hold_are_not_let_go_by_who_asks_for_the_stop_too(
     assert 'votes alone hold' in walk.loop.change({'cadence_scale': 1.5})
     walk.walk(0.3, 1.0)
     assert walk.loop.stop.state == 'walking'
+
+
+@pytest.mark.parametrize('wait', [0.0, 0.004, 0.1, 0.6])
+def test_a_gain_for_the_gait_that_is_wanted_waits_until_it_is_walked(wait: float) -> None:
+    walk = Walk('bound', capture_speed=2.0)
+    walk.walk(0.7, 2.0)
+    assert accepted(walk, gait='amble')
+    walk.run(wait)
+    told = walk.loop.change({'inhibition_gain': 210.0})
+    assert 'among bound, amble' in told and 'when the gait has changed' in told
+    assert 'nearest value' in walk.loop.change({'inhibition_gain': 150.0})  # for an amble neither
+    walk.stop()
+    walk.walk(0.7, 3.0)
+    assert walk.loop.canon.gait.name == 'amble' and accepted(walk, inhibition_gain=210.0)
+    walk.stop()
