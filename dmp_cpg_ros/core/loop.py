@@ -135,7 +135,8 @@ class WalkingLoop:
         self.parameters = p
         self.reference = ReferenceSystem(
             p.reference, self.canonical.scale.hip_radius, Governor(gaits, self.canonical.scale))
-        self.supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
+        self.supervisor = GaitSupervisor(
+            p.inhibition, p.voting, p.leg.activity_rate, p.reference)
         self.voting = Voting(p.inhibition, p.voting, p.votes, p.reference, self._weight)
 
     def tick(self, state: RobotState) -> Tick:

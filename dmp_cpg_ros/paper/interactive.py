@@ -117,7 +117,8 @@ class Page:
         canonical = RunningGait(p.canonical, self.scale, KnownGaits({gait.name: gait}))
         reference = ReferenceSystem(
             p.reference, self.scale.hip_radius, Governor((gait,), self.scale))
-        supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
+        supervisor = GaitSupervisor(
+            p.inhibition, p.voting, p.leg.activity_rate, p.reference)
         canon, r = canonical.initial_state(gait, p.inhibition), np.array(COMMAND)
         state = supervisor.initial_state(leg=p.canonical.first_leg)
         inhibition = supervisor.inhibition(state)

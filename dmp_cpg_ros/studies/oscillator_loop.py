@@ -65,7 +65,8 @@ class Oscillators(WalkingLoop):
     def _leave_out_places(self) -> None:
         if self._weaken == 'places':
             of = self.supervisor
-            self.supervisor = _Hasty(of.parameters, of.voting, of.activity_rate)
+            self.supervisor = _Hasty(
+                of.parameters, of.voting, of.activity_rate, of.reference)
 
     def certified(self) -> bool:
         """Whether the present parameters have a certificate."""

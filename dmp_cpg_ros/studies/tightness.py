@@ -341,7 +341,8 @@ def rest_row(graph: str) -> Row:
     canonical = RunningGait(coupled, BodyScale(0.28, 0.22), KnownGaits({gait.name: gait}))
     network = canonical.network(gait)
     bound = certify(Setting.of(network, p, tick)).time_to_rest
-    supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
+    supervisor = GaitSupervisor(
+        p.inhibition, p.voting, p.leg.activity_rate, p.reference)
     fastest = np.array([p.reference.max_speed, p.reference.max_lateral_speed,
                         p.reference.max_turn_rate])
     walking = replace(supervisor.initial_state(), state='walking', requested=False, armed=False,

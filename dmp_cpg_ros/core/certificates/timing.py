@@ -31,6 +31,7 @@ from dmp_cpg_ros.core.inhibition import entry, supervisor
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import phi_functions
+from dmp_cpg_ros.core.reference.operating_range import REST_SPEED
 from dmp_cpg_ros.core.reference.stop_distance import slowing_time
 
 DELAY_TICKS = 6
@@ -285,7 +286,7 @@ def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed
     of = _falling(s, capture, turning, away) if step is None else _falling_in_steps(
         s, capture, step)
     fade, cells = math.exp(-alpha_r * of.cell), int(_HORIZON / of.cell)
-    if a_b == 0.0 and not speed * fade ** (cells - 1) <= 1.001 * supervisor.REST_SPEED:
+    if a_b == 0.0 and not speed * fade ** (cells - 1) <= 1.001 * REST_SPEED:
         return math.inf
     swings = _filtered(math.exp(-s.parameters.leg.activity_rate * of.cell))
     carried, fed = _in_a_block(of)
@@ -308,7 +309,7 @@ def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed
         swinging = swings @ np.concatenate([activity[None], wanted])
         resting = np.flatnonzero(
             (phase_rate.max(axis=1) <= supervisor.REST_PHASE_RATE)
-            & (np.array(speeds) <= supervisor.REST_SPEED)
+            & (np.array(speeds) <= REST_SPEED)
             & (swinging[:-1].max(axis=1) <= supervisor.REST_ACTIVITY))
         if len(resting) > 0:
             cell = begin + int(resting[0])

@@ -34,10 +34,11 @@ def adopted(acting: Inhibition, time_ns: int, parameters: InhibitionParameters
         Gains that the service's stop has.
     """
     stop, gains, leg = acting.requested, acting.gains, int(np.argmax(acting.gains))
-    word = ('at_rest' if acting.at_rest else 'waiting') if stop else 'releasing'
+    armed = stop and bool(gains.any())
+    word = 'at_rest' if acting.at_rest else 'captured' if armed else 'waiting'
     voted = stop and bool(np.any(gains > parameters.gains_on(leg)))
     return SupervisorState(
-        time_ns, word, stop, acting.automatic, time_ns, stop and bool(gains.any()),
+        time_ns, word if stop else 'releasing', stop, acting.automatic, time_ns, armed,
         np.full(len(LEGS), 0.0 if acting.at_rest else 1.0),
         measured_s=0.0 if acting.at_rest else float('nan'), asked=stop, voted=voted,
         vote_gains=gains if voted else np.zeros(len(LEGS)), leg=leg,

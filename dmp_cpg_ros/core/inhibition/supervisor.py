@@ -44,6 +44,8 @@ from dmp_cpg_ros.core.inhibition.step_timing import quickened
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.reference.operating_range import REST_SPEED, armed_speed
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import activities_step
 from dmp_cpg_ros.core.voting.parameters import SUM, VotingParameters
@@ -58,9 +60,6 @@ FALLEN_MODES = ('damped', 'recovering')
 
 REST_ACTIVITY = 0.02
 """Swing activity below which a leg is at rest: its foot is below 2 % of its clearance."""
-
-REST_SPEED = 0.01
-"""Reference foot speed below which the reference is at rest [m/s]."""
 
 REST_PHASE_RATE = 0.05
 """Phase rate below which an oscillator is at rest [rad/s]."""
@@ -83,12 +82,15 @@ class GaitSupervisor:
         How a stop by votes holds and ends.
     activity_rate : float
         Rate at which the legs' swing activity follows the rates of their oscillators [1/s].
+    reference : ReferenceParameters
+        Limits of the commands, within which inhibition is armed.
     """
 
     def __init__(self, parameters: InhibitionParameters, voting: VotingParameters,
-                 activity_rate: float) -> None:
+                 activity_rate: float, reference: ReferenceParameters) -> None:
         """Keep the parts."""
         self.parameters, self.voting, self.activity_rate = parameters, voting, activity_rate
+        self.reference = reference
 
     def initial_state(self, time_ns: int = 0, leg: int = 0) -> SupervisorState:
         """At rest, a leg inhibited, or free when ``start_inhibited`` is false."""
@@ -287,9 +289,12 @@ class GaitSupervisor:
         if not self.parameters.auto and self.parameters.armed_gains[state.leg] == 0.0:
             # auto keeps what holds when it takes over in this stop
             state = replace_unchecked(state, leg=int(self.parameters.armed_gains.argmax()))
-        armed = inside = state.armed and self._inside(state, network, x)
+        # legs that come in are asked anew whether they may: parameters may have changed meanwhile
+        held = state.armed and state.state in ('captured', 'at_rest')
+        armed = inside = held and self._inside(state, network, x)
         if not inside:
-            armed = speed <= self.parameters.capture_speed and self.in_places(network, x)
+            most = armed_speed(network.scale, self.parameters, self.reference)
+            armed = speed <= most and self.in_places(network, x)
             state = self._aimed(state, network, x, armed)
             inside = self._inside(state, network, x)
         if not (armed and inside):

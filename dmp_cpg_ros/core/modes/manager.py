@@ -19,12 +19,13 @@ from dmp_cpg_ros.core.balance.body_command import BALANCED, WITHOUT_MOVEMENT, Bo
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase_rate
 from dmp_cpg_ros.core.clock import carried
-from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY, REST_PHASE_RATE, REST_SPEED
+from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY, REST_PHASE_RATE
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.modes import falls
 from dmp_cpg_ros.core.modes.motion_library import SIDES, Movements, phase_at, unit_movement
 from dmp_cpg_ros.core.parameters import parameter
+from dmp_cpg_ros.core.reference.operating_range import REST_SPEED
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState

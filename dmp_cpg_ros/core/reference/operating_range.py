@@ -9,10 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+
+REST_SPEED = 0.01
+"""Reference foot speed below which the reference is at rest [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -60,14 +64,29 @@ def operating_range(network: GaitNetwork, inhibition: InhibitionParameters,
     -------
     OperatingRange
     """
-    fastest = network.scale.foot_speed(reference.max_speed, reference.max_lateral_speed,
-                                       reference.max_turn_rate)
-    armed = min(fastest, inhibition.capture_speed)
+    fastest, armed = _fastest(network.scale, reference), armed_speed(
+        network.scale, inhibition, reference)
     speeds, omegas = _cadences(network, armed)
     slopes = np.abs(np.diff(omegas) / np.maximum(np.diff(speeds), 1e-12))
-    return OperatingRange(fastest, armed, _extremes(_cadences(network, fastest)[1]),
+    return OperatingRange(fastest, armed, _extremes(_cadences(network, max(fastest, armed))[1]),
                           _extremes(omegas), network.gait.omega(0.0, network.scale),
                           float(slopes.max(initial=0.0)))
+
+
+def armed_speed(scale: BodyScale, inhibition: InhibitionParameters,
+                reference: ReferenceParameters) -> float:
+    """Largest foot speed at which a stop arms inhibition [m/s].
+
+    Not above the limits of the commands, for cadences beyond them are not certified: after limits
+    were lowered the reference comes down to them first.
+    """
+    return min(inhibition.capture_speed, max(_fastest(scale, reference), REST_SPEED))
+
+
+def _fastest(scale: BodyScale, reference: ReferenceParameters) -> float:
+    """Largest foot speed that can be commanded [m/s]."""
+    return scale.foot_speed(
+        reference.max_speed, reference.max_lateral_speed, reference.max_turn_rate)
 
 
 def _cadences(network: GaitNetwork, largest: float) -> tuple[Array, Array]:

@@ -300,7 +300,8 @@ class Certified:
         """What stops and starts the gait."""
         of = self._node.parameters_of
         return GaitSupervisor(
-            of(InhibitionParameters), of(VotingParameters), of(LegParameters).activity_rate)
+            of(InhibitionParameters), of(VotingParameters), of(LegParameters).activity_rate,
+            of(ReferenceParameters))
 
     def commands(self) -> CommandGate:
         """What comes on ``cmd_vel``, limited."""

@@ -43,7 +43,8 @@ class Gait:
                  stop: SupervisorState | None = None) -> None:
         self.network, self.reference = gait, ReferenceSystem(
             reference, gait.scale.hip_radius)
-        self.supervisor = GaitSupervisor(inhibition, VotingParameters(), LEG.activity_rate)
+        self.supervisor = GaitSupervisor(
+            inhibition, VotingParameters(), LEG.activity_rate, reference)
         self.stop = stop or replace(self.supervisor.initial_state(), state='walking',
                                     requested=False, armed=False, activity=np.ones(4))
         self.published, self.x, self.r = self.supervisor.inhibition(self.stop), x, r

@@ -234,3 +234,44 @@ def test_a_gain_for_the_gait_that_is_wanted_waits_until_it_is_walked(wait: float
     walk.walk(0.7, 3.0)
     assert walk.loop.canon.gait.name == 'amble' and accepted(walk, inhibition_gain=210.0)
     walk.stop()
+
+
+SLOW = {'max_speed': 0.05, 'max_lateral_speed': 0.0, 'max_turn_rate': 0.0}
+"""Limits at which a trot needs a gain of 162 1/s, and at 3 m/s one of 300."""
+
+
+@pytest.mark.parametrize('wait', [0.0, 0.08, 0.16, 0.24])
+def test_legs_are_caught_at_a_cadence_that_the_limits_of_commands_allow(wait: float) -> None:
+    walk = Walk('trot', capture_speed=3.0)
+    walk.walk(3.0, 3.0 + wait)
+    assert accepted(walk, **SLOW) and accepted(walk, inhibition_gain=162.0)
+    _, predicted, measured = walk.stop()
+    assert measured == pytest.approx(predicted, abs=1e-9)
+
+
+def test_legs_that_come_to_their_region_are_caught_as_the_parameters_of_then_allow() -> None:
+    def stopping(ticks: int) -> Walk:
+        walk = Walk('trot', capture_speed=3.0)
+        walk.walk(3.0, 3.0)
+        walk.loop.request(True)
+        for _ in range(ticks):
+            walk.tick()
+        return walk
+
+    walk, ticks = stopping(0), 0
+    while walk.loop.stop.state != 'captured':
+        walk.tick()
+        ticks += 1
+    walk = stopping(ticks - 1)
+    assert walk.loop.stop.armed and not walk.loop.held
+    assert accepted(walk, **SLOW) and accepted(walk, inhibition_gain=162.0)
+    walk.run(2.0)
+    assert walk.loop.stop.state == 'at_rest' and walk.left_region == 0
+
+
+def test_a_stop_within_limits_of_zero_is_bounded() -> None:
+    walk = Walk()
+    walk.walk(0.5, 2.0)
+    assert accepted(walk, **{**SLOW, 'max_speed': 0.0})
+    bound, *_ = walk.stop()
+    assert bound < 4.0
