@@ -220,7 +220,8 @@ class WalkingLoop:
         self.stop = self.supervisor.request(self.stop, stop)
         self.outlook = look_ahead(
             self.supervisor, self.reference, self.canonical, self.stop, self.inhibition,
-            self.canon, self.r, self.gate.at(self.stop.time_ns), self._dt)
+            self.canon, self.r, self.gate.foreseen(self.stop.time_ns + round(1e9 * self._dt)),
+            self._dt)
         return self.outlook.time_s
 
     def change(self, values: Mapping[str, Any]) -> str:

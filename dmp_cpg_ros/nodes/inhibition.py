@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
+from dmp_cpg_ros.core.certificates import gate
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.gait.contact_feedback import initial_contact_state
@@ -87,7 +88,7 @@ class InhibitionNode(SuiteNode):
         self._x: Any = None
         self._x_dot: Any = None
         self._r, self._body_mode = np.zeros(3), 'standing'
-        self._promise = Promise()
+        self._promise, self._promised_for = Promise(), self._running
         self._due_ns, self._told_ns, self._blind = inf, -HEARTBEAT_NS, ''
         self._drive, self._joined, self._asked = FOLLOWING, False, False
         self._began_ns = -1
@@ -131,7 +132,12 @@ class InhibitionNode(SuiteNode):
         """Take over what may change while walking."""
         self._build()
         self._network = self._running_gait.network(self._network.gait)
+        self._slow = self._unhurried(self._network.gait)
         self.certified.limit(self._gate)
+        under_way = self._joined and not isfinite(self._state.measured_s)
+        if under_way and not gate.UNCERTIFIED.issuperset(self._running.differences(
+                self._promised_for)):
+            self._predict()
 
     def _build(self) -> None:
         of = self.parameters_of
@@ -287,7 +293,7 @@ class InhibitionNode(SuiteNode):
         """State of the stop."""
         return {'inhibition': self._state.state, 'requested': self._state.in_force,
                 'pushed': self._state.push.acts, 'blocked': self._state.block.acts,
-                'command': self._gate.at(self._state.time_ns)}
+                'command': self._gate.foreseen(self._state.time_ns)}
 
     # The service -------------------------------------------------------------------------------
 
@@ -297,6 +303,7 @@ class InhibitionNode(SuiteNode):
         """
         stop: bool = request.data
         self._asked = True
+        self.take_parameters()  # with which the tick begins in which the request acts
         if self._x is None:
             return False, 'no canonical_state and reference yet; is canonical_oscillators running?'
         barring = self._barring
@@ -324,31 +331,41 @@ class InhibitionNode(SuiteNode):
         return True, self._promise.words(
             stop, self._words(), self._supervisor.parameters.push_recovery)
 
+    @property
+    def _running(self) -> gate.Running:
+        """What runs in the gait in force, or in the change between two."""
+        return self.certified.running_in(self._network.gait)
+
     def _predict(self) -> None:
-        """Look ahead to the rest or the walk that was just requested."""
-        gait = self._network.gait
+        """Look ahead to the rest or the walk that was requested, just now or before parameters
+        have changed.
+        """
+        gait, state, running = self._network.gait, self._state, self._running
         canon = CanonicalState(
             gait, self.certified.gaits.named(gait_name(self)), self._slow.gait.cadence_scale,
             self._x, self._x_dot, initial_contact_state())
+        tick_ns = self.parameters_of(TickParameters).tick_ns
+        command = self._gate.foreseen(state.time_ns + tick_ns)
         outlook = look_ahead(
-            self._supervisor, self._reference, self._running_gait, self._state, self._acting,
-            canon, self._r, self._gate.at(self._state.time_ns),
-            self.parameters_of(TickParameters).tick_ns * 1e-9, body_mode=self._body_mode)
-        predicted = outlook.time_s
-        if isfinite(self._state.measured_s):  # released by a push in full swing: it runs already
-            predicted = self._state.measured_s
-        running = self.certified.running_in(gait)
-        way = running.stop_distance(
-            self._r, self._gate.at(self._state.time_ns)) if self._state.requested else nan
-        if self._state.requested and self._state.voted:
+            self._supervisor, self._reference, self._running_gait, state, self._acting,
+            canon, self._r, command, tick_ns * 1e-9, body_mode=self._barring)
+        way = running.stop_distance(self._r, command) if state.requested else nan
+        if state.requested and state.voted:
             bound = self._bound_by_votes()
-        elif self._state.requested:
-            bound = running.time_to_rest(self._slow, self._x, self._r, self._state.quickness)
+        elif state.requested:
+            bound = running.time_to_rest(self._slow, self._x, self._r, state.quickness)
         else:
-            bound = self.certified.certificate_in(gait).time_to_walking
-        self._promise = Promise(predicted, bound, way, outlook)
-        requested = self._state.requested and isfinite(bound)
-        self._due_ns = self._state.time_ns + 1e9 * bound if requested else inf
+            bound = (self.certified.certificate_in(gait).time_to_walking
+                     if isfinite(outlook.time_s) else inf)
+        self._due_ns = state.time_ns + 1e9 * bound if (
+            state.requested and isfinite(bound)) else inf
+        promise = Promise(outlook.time_s, bound, way, outlook)
+        if isfinite(state.measured_s):  # released by a push in full swing: it runs already
+            promise = promise._replace(predicted_s=state.measured_s)
+        elif state.time_ns > state.request_ns:
+            promise = promise.told_later(
+                1e-9 * (state.time_ns - state.request_ns), self._promise.bound_m)
+        self._promise, self._promised_for = promise, running
 
     def _bound_by_votes(self) -> float:
         """Bound on the time from now to rest under the votes [s]."""
@@ -369,7 +386,7 @@ class InhibitionNode(SuiteNode):
         now = self._state
         return (now.state, now.requested, now.armed, now.automatic, now.request_ns, now.voted,
                 now.tally.causes, now.tally.weights.tobytes(), now.leg, now.rest_phase,
-                now.block.acts)
+                now.block.acts, self._promise)
 
     def _publish_gains(self) -> None:
         self._told_ns = self._state.time_ns

@@ -23,6 +23,7 @@ from dmp_cpg_ros.nodes.framework.known_stop import BRIEF_NS, PATIENT_NS
 from dmp_cpg_ros.nodes.inhibition import HEARTBEAT_NS, InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
+from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES
 from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
 from dmp_cpg_ros.nodes.posture_control import PostureControl
@@ -94,6 +95,35 @@ def test_while_nothing_is_known_of_the_gait_no_time_to_rest_is_promised(ros: Ros
         assert not told and 'from reference_filter' in answer and 'at rest in' not in answer
     node._watch(now + 10_000_000_000)
     assert node.health.has_problem('bound')
+    node.destroy_node()
+
+
+def test_a_stop_for_a_drive_that_looks_after_itself_is_predicted_whatever_is_commanded(ros: Ros
+                                                                                       ) -> None:
+    predicted = []
+    for stops in (lambda node: node._take_request(SetBool.Request(data=True)),
+                  lambda node: node._on_drive(String(data=DRIVE_MODES[1]))):
+        node, _ = watching(ros, KNOWN)
+        node._gate.accept(0.5, 0.0, 0.0)
+        stops(node)
+        assert node._state.requested
+        predicted.append(node._promise.predicted_s)
+        node.destroy_node()
+    assert abs(predicted[0] - predicted[1]) < 1.5e-9 * TICK  # which acts at once
+
+
+@pytest.mark.parametrize('values', [{'alpha_r': 1.5}, {'caution': False}])
+def test_a_change_in_a_stop_changes_what_is_promised_of_it(ros: Ros, values: dict[str, Any]
+                                                            ) -> None:
+    node, now = watching(ros, KNOWN)
+    node._r = np.array([0.5, 0.0, 0.0])
+    assert node._take_request(SetBool.Request(data=True))[0]
+    told, due = node._promise, node._due_ns
+    node.health.stamp_ns = node._state.time_ns
+    node.parameter_changes.follow(values)
+    node.take_parameters()
+    later = node._promise.predicted_s > told.predicted_s and node._due_ns > due
+    assert later == ('alpha_r' in values) and (later or node._promise is told)
     node.destroy_node()
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -124,6 +125,50 @@ def test_no_node_accepts_what_the_gait_that_is_still_walked_does_not_bear(
     plain.write_text(HANDED_OVER, encoding='utf-8')
     recording, (_, ticks) = load_recording(tmp_path / 'run' / 'bag'), plain_run(plain, **settings)
     assert ticks[-1].supervisor.state == 'at_rest'
+    np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
+
+
+SEVERAL = """\
+name: several
+duration: 9.0
+parameters: {auto_delay: 0.2}
+events:
+  - {at: 0.1, command: {v_x: 0.4}}
+  - {at: 0.1, inhibit: false}
+  - {at: 1.0, set: {max_speed: 0.2}}
+  - {at: 1.0, command: {v_x: 0.5}}
+  - {at: 1.5, set: {alpha_r: 1.5}}
+  - {at: 1.5, inhibit: true}
+  - {at: 4.0, set: {max_speed: 0.5, alpha_r: 4.0}}
+  - {at: 4.0, inhibit: false}
+  - {at: 5.0, command: {v_x: 0.3}}
+  - {at: 5.0, inhibit: true}
+  - {at: 5.0, inhibit: false}
+  - {at: 5.0, command: silence}
+  - {at: 5.74, set: {alpha_r: 2.0}}
+"""
+
+
+def test_several_changes_and_requests_within_a_tick_act_as_they_are_predicted(
+    processes: Processes, tmp_path: Path
+) -> None:
+    settings = {'physics': 'perfect_tracking', 'control_rate': SHARED_HZ}
+    process = processes.walk(
+        SEVERAL, tmp_path / 'run', '--lock-step', '--composed', *(
+            item for name, value in settings.items() for item in ('--set', f'{name}:={value}')))
+    assert process.wait(RUN_S) == 0, str(process)
+    metrics = json.loads((tmp_path / 'run' / 'metrics.json').read_text(encoding='utf-8'))
+    for kind, count in (('stop', 2), ('start', 2)):
+        entries = [entry for entry in metrics[kind]['all'] if not entry['overruled']]
+        assert len(entries) == count, metrics[kind]
+        for entry in entries:
+            assert entry['measured_s'] == pytest.approx(entry['predicted_s'], abs=1e-9), entry
+            assert entry['measured_s'] <= entry['bound_s'], entry
+    for log in (tmp_path / 'run' / 'logs').iterdir():
+        assert 'was to rest by' not in log.read_text(encoding='utf-8')
+    plain = tmp_path / 'plain.yaml'
+    plain.write_text(SEVERAL, encoding='utf-8')
+    recording, (_, ticks) = load_recording(tmp_path / 'run' / 'bag'), plain_run(plain, **settings)
     np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
 
 

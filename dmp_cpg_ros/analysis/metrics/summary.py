@@ -43,7 +43,8 @@ def _summary(entries: list[dict[str, Any]]) -> dict[str, Any]:
 
 def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[str, Any]:
     at_rest = next((event for event in episode.events if event.message == 'at_rest'), None)
-    entry = {**_times(recording, episode, at_rest), 'distance_bound_m': _first(episode, 'bound_m')}
+    entry = {**_times(recording, episode, at_rest),
+             'distance_bound_m': _promised(episode, at_rest, 'bound_m')}
     if at_rest is None:
         return entry
     end = episodes.stands_until(recording, at_rest.time, episode.end)
@@ -73,15 +74,17 @@ def _times(recording: Recording, episode: Episode, done: StatusEvent | None) -> 
         measured = done.time - request
     following = next((event for event in recording.inhibition
                       if event.time >= episode.end and event not in episode.events), first)
-    return {'request_s': request, 'predicted_s': _first(episode, 'predicted_s'),
-            'bound_s': _first(episode, 'bound_s'), 'measured_s': measured,
+    return {'request_s': request, 'predicted_s': _promised(episode, done, 'predicted_s'),
+            'bound_s': _promised(episode, done, 'bound_s'), 'measured_s': measured,
             'overruled': measured is None and (
                 following.values.get('requested') != first.values.get('requested'))}
 
 
-def _first(episode: Episode, key: str) -> float | None:
-    numbers = (event.number(key) for event in episode.events)
-    return next((number for number in numbers if number is not None), None)
+def _promised(episode: Episode, done: StatusEvent | None, key: str) -> float | None:
+    """What was promised last before it was done: changes of parameters change the promise."""
+    numbers = [event.number(key) for event in episode.events
+               if done is None or event.time <= done.time]
+    return next((number for number in reversed(numbers) if number is not None), None)
 
 
 def _body_at_rest(

@@ -45,7 +45,8 @@ class Outlook(NamedTuple):
     ----------
     time_s : float
         From now to rest (of a stop) or to phase lock (of a start) [s]; infinite when it does not
-        happen within the horizon.
+        happen within the horizon, or not before what was asked for is turned round by itself, as
+        by ``auto_inhibit``.
     down_s : float
         Until the last foot that swings is down [s]; NaN for a start.
     way_m : float
@@ -101,16 +102,18 @@ def look_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical
     body_mode : str
         What the body does, assumed to stay.
     """
-    down_s, way_m, speed = 0.0, 0.0, hypot(r[0], r[1])
+    down_s, way_m, speed, stop = 0.0, 0.0, hypot(r[0], r[1]), state.requested
     ticks = ticks_ahead(supervisor, reference, canonical, state, published, canon, r, command, dt,
                         body_mode)
     for k, (state, _, canon, r) in zip(range(1, ceil(horizon / dt) + 1), ticks, strict=False):
-        if state.requested:
+        if state.requested != stop:
+            break
+        if stop:
             way_m += dt * hypot(r[0], r[1])
             if _up(canon, state, canon.gait.pace(r, canonical.scale)[3]):
                 down_s = k * dt
         if state.state in ('at_rest', 'walking', 'free', 'stepping'):
-            return Outlook(k * dt, down_s if state.requested else nan, way_m, speed)
+            return Outlook(k * dt, down_s if stop else nan, way_m, speed)
     return Outlook(inf, nan, nan, speed)
 
 

@@ -82,12 +82,11 @@ class CommandGate:
         """Start with a zero command."""
         self._scale, self.limited_by = scale, ''
         self.asked: Triple = (0.0, 0.0, 0.0)
-        self._command: Triple = (0.0, 0.0, 0.0)
         self._received_ns, self._fresh = 0, False
         self.follow(parameters, gaits)
 
     def follow(self, parameters: ReferenceParameters, gaits: Sequence[Gait]) -> None:
-        """Take new limits; they hold for the next command, those of the gait at once."""
+        """Take new limits; they hold from the next :meth:`at` on, whatever was accepted when."""
         self.parameters = parameters
         scale, self._fastest = self._scale, None
         if gaits and scale is not None:
@@ -100,7 +99,7 @@ class CommandGate:
         Parameters
         ----------
         v_x, v_y, gamma : float
-            Forward and sideways speed [m/s], turn rate [rad/s]; limited to the parameters' ranges.
+            Forward and sideways speed [m/s], turn rate [rad/s].
 
         Raises
         ------
@@ -110,35 +109,40 @@ class CommandGate:
         if not np.all(np.isfinite((v_x, v_y, gamma))):
             raise DataError(
                 f'command v = ({v_x}, {v_y}) m/s, gamma = {gamma} rad/s must be finite')
-        p, asked = self.parameters, (float(v_x), float(v_y), float(gamma))
-        limits = (p.max_speed, p.max_lateral_speed, p.max_turn_rate)
-        v_x, v_y, gamma = (min(max(float(value), -limit), limit) for value, limit in zip(
-            (v_x, v_y, gamma), limits, strict=True))
-        self.asked = asked
-        self._command, self._fresh = (v_x, v_y, gamma), True
+        self.asked, self._fresh = (float(v_x), float(v_y), float(gamma)), True
         self._limit()
 
     def _limit(self) -> None:
-        """Bring the command within the limits of the fastest gait."""
-        gait, self._limited = self._fastest, self._command
-        self._cut_by = '' if self._command == self.asked else 'range'
+        """Bring the command within its range and the limits of the fastest gait."""
+        p, gait, (v_x, v_y, gamma) = self.parameters, self._fastest, self.asked
+        self._limited = in_range = (min(max(v_x, -p.max_speed), p.max_speed),
+                                    min(max(v_y, -p.max_lateral_speed), p.max_lateral_speed),
+                                    min(max(gamma, -p.max_turn_rate), p.max_turn_rate))
+        self._cut_by = '' if in_range == self.asked else 'range'
         if gait is not None and self._scale is not None:
-            self._limited = gait.limited(
-                self._command, self._scale, self.parameters.max_curve * gait.two_sided)
-            if self._limited != self._command:
+            self._limited = gait.limited(in_range, self._scale, p.max_curve * gait.two_sided)
+            if self._limited != in_range:
                 self._cut_by = 'gait'
 
     def at(self, time_ns: int) -> tuple[float, float, float]:
-        """Command that acts at a time on the robot's clock [ns]: (v_x, v_y, γ)."""
+        """Command that acts at a tick, with its stamp on the robot's clock [ns]: (v_x, v_y, γ)."""
         if self._fresh:
             self._fresh, self._received_ns = False, time_ns
         self._received_ns = min(self._received_ns, time_ns)
+        command, self.limited_by = self._acting(time_ns)
+        return command
+
+    def foreseen(self, time_ns: int) -> Triple:
+        """Command that will act at a tick if no other comes: :meth:`at` without its effect."""
+        return self._acting(time_ns)[0]
+
+    def _acting(self, time_ns: int) -> tuple[Triple, str]:
+        """Command at a time [ns], and what cuts it."""
         timeout = self.parameters.cmd_vel_timeout
-        if timeout > 0.0 and (time_ns - self._received_ns) * 1e-9 > timeout:
-            self.limited_by = 'timeout'
-            return 0.0, 0.0, 0.0
-        self.limited_by = self._cut_by
-        return self._limited
+        silent = 0.0 < timeout < (time_ns - self._received_ns) * 1e-9
+        if silent and not self._fresh:
+            return (0.0, 0.0, 0.0), 'timeout'
+        return self._limited, self._cut_by
 
 
 class ReferenceSystem:

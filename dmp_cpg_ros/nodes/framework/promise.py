@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is promised of a stop or a start that was just requested."""
+"""What is promised of a stop or a start that was requested."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ class Promise(NamedTuple):
     Attributes
     ----------
     predicted_s, bound_s : float
-        Time to rest or to walking as predicted, and its certified bound [s]; not finite where
-        there is none.
+        Time from the request to rest or to walking as predicted, and its certified bound [s]; not
+        finite where there is none.
     bound_m : float
         Way of the reference until rest, at most [m]; NaN for a start.
     outlook : Outlook or None
@@ -33,6 +33,14 @@ class Promise(NamedTuple):
     def stands_s(self) -> float:
         """Time until the body stands [s]."""
         return self.outlook.stands_s if self.outlook else nan
+
+    def told_later(self, since_s: float, before_m: float) -> Promise:
+        """The same when the request is some time ago [s], since when the reference has gone no
+        farther than was promised then [m].
+        """
+        outlook = self.outlook and self.outlook._replace(down_s=self.outlook.down_s + since_s)
+        return Promise(self.predicted_s + since_s, self.bound_s + since_s,
+                       self.bound_m + before_m, outlook)
 
     def words(self, stop: bool, certificate: str, push_recovery: bool) -> str:
         """Say it, with the certificate in a few words; and whether pushes begin the gait anew."""

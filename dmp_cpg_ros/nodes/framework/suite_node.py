@@ -400,6 +400,10 @@ class SuiteNode(GuardedLifecycleNode):
         self.health.ticks += 1
         self.health.stamp_ns = stamp_ns
         self._commands.take()
+        self.take_parameters()
+
+    def take_parameters(self) -> None:
+        """Let what has been accepted take effect, as at the next tick."""
         if self.parameter_changes.accepted is not self._sets:
             self._sets = self.parameter_changes.accepted
             self.on_parameters()

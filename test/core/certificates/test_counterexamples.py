@@ -275,3 +275,15 @@ def test_a_stop_within_limits_of_zero_is_bounded() -> None:
     assert accepted(walk, **{**SLOW, 'max_speed': 0.0})
     bound, *_ = walk.stop()
     assert bound < 4.0
+
+
+@pytest.mark.parametrize('delay', [0.0, 0.05, 0.2, 0.4])
+def test_a_start_that_is_stopped_before_it_walks_is_not_said_to_walk(delay: float) -> None:
+    walk, words = Walk(auto_inhibit=True, auto_delay=delay), set[str]()
+    walk.run(0.5)
+    predicted = walk.loop.request(False)
+    for _ in range(300):
+        walk.tick()
+        words.add(walk.loop.stop.state)
+    assert 'at_rest' in words
+    assert (predicted < np.inf) == ('free' in words) == (delay == 0.4)

@@ -131,7 +131,7 @@ def test_a_leg_that_is_caught_is_kept_when_another_one_takes_over_the_stop() -> 
     loop = walking(oscillators(), 0.5, 2.2)
     stopped(loop)
     assert loop.stop.rest_phase > 0.0
-    taken = adopted(loop.inhibition, loop.now_ns)
+    taken = adopted(loop.inhibition, loop.now_ns, loop.supervisor.parameters)
     assert (taken.leg, taken.rest_phase) == (loop.stop.leg, loop.stop.rest_phase)
     before = loop.x.copy()
     loop.stop, loop.inhibition = taken, loop.supervisor.inhibition(taken)

@@ -128,6 +128,28 @@ def test_a_command_acts_until_its_timeout_and_then_is_zero() -> None:
     assert gate.at(1199 * MS) == (0.3, 0.0, 0.0)
 
 
+def test_to_foresee_a_command_changes_nothing() -> None:
+    gate = CommandGate(ReferenceParameters(cmd_vel_timeout=0.5))
+    gate.accept(0.5, 0.0, 0.0)
+    assert gate.foreseen(4 * MS) == (0.5, 0.0, 0.0)
+    assert gate.at(100 * MS) == gate.foreseen(600 * MS) == (0.5, 0.0, 0.0)
+    assert gate.foreseen(601 * MS) == (0.0, 0.0, 0.0) and gate.limited_by == ''
+    assert gate.at(600 * MS) == (0.5, 0.0, 0.0)
+
+
+@pytest.mark.parametrize('first', [True, False])
+def test_limits_hold_for_commands_that_come_before_them_or_after(first: bool) -> None:
+    gate = CommandGate(ReferenceParameters())
+    for limits in (first, not first):
+        if limits:
+            gate.follow(ReferenceParameters(max_speed=0.2), ())
+        else:
+            gate.accept(0.5, 0.0, 0.0)
+    assert gate.at(0) == (0.2, 0.0, 0.0) and gate.limited_by == 'range'
+    gate.follow(ReferenceParameters(), ())
+    assert gate.at(4 * MS) == (0.5, 0.0, 0.0) and gate.limited_by == ''
+
+
 def test_without_a_timeout_a_command_stays() -> None:
     gate = CommandGate(ReferenceParameters(cmd_vel_timeout=0.0))
     gate.accept(0.5, 0.0, 0.0)
