@@ -104,11 +104,13 @@ def shown(value: Any) -> str:
 
 
 def typed(value: Any) -> str:
-    """Value as one types it for a parameter: lists in brackets, floats never as whole numbers."""
+    """Value as one types it for a parameter: lists in brackets, floats never as whole numbers and
+    with all of their digits but rounding.
+    """
     if isinstance(value, (tuple, list)):
         return f'[{", ".join(map(str, value))}]'
     if isinstance(value, float):
-        text = f'{value:g}'
+        text = f'{value:.12g}'
         return text if set(text) & set('.en') else f'{text}.0'
     return str(value)
 

@@ -8,6 +8,7 @@ from math import isfinite, nan
 from typing import NamedTuple
 
 from dmp_cpg_ros.core.inhibition.prediction import Outlook
+from dmp_cpg_ros.core.maths.rounding import exactly, no_less
 
 
 class Promise(NamedTuple):
@@ -44,11 +45,12 @@ class Promise(NamedTuple):
 
     def words(self, stop: bool, certificate: str, push_recovery: bool) -> str:
         """Say it, with the certificate in a few words; and whether pushes begin the gait anew."""
-        when = f'in {self.predicted_s:.3f} s' if isfinite(self.predicted_s) else 'not within 10 s'
-        most = f'at most {self.bound_s:.3f} s' if isfinite(self.bound_s) else (
+        when = f'in {exactly(self.predicted_s)} s' if isfinite(self.predicted_s) else (
+            'not within 10 s')
+        most = f'at most {no_less(self.bound_s)} s' if isfinite(self.bound_s) else (
             'without a bound from this state')
-        way = (f'; the reference goes on for at most {self.bound_m:.3f} m{self._standing()}' + (
-            '; a push may begin it anew' if push_recovery else '')) if stop else ''
+        way = (f'; the reference goes on for at most {no_less(self.bound_m)} m{self._standing()}'
+               + ('; a push may begin it anew' if push_recovery else '')) if stop else ''
         return f'{"at rest" if stop else "walking"} {when}, {most}; {certificate}{way}'
 
     def _standing(self) -> str:
@@ -57,4 +59,4 @@ class Promise(NamedTuple):
         if of is None or not isfinite(of.time_s):
             return ''
         return (f'; the body stands in about {of.stands_s:.2f} s, by trials within '
-                f'{of.stands_within_s:.2f} s and {of.stands_within_m:.2f} m')
+                f'{no_less(of.stands_within_s, 2)} s and {no_less(of.stands_within_m, 2)} m')
