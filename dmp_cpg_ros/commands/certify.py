@@ -15,11 +15,12 @@ from dmp_cpg_ros.analysis.strict_json import to_json, write_json
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, given_file, run_command
 from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.core.certificates import inequality, proof, suggest, votes
-from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.maths.rounding import no_less
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.suite import Suite, load_suite
@@ -51,15 +52,15 @@ def _certify(options: argparse.Namespace, ros: RosArguments) -> int:
     if options.robot is not None:
         overrides['robot'] = str(find_config(options.robot, ROBOTS).resolve())
     suite = load_suite(file, overrides, ros.namespace)
-    p, running = suite.parameters, running_setting(suite)
-    needed = votes.votes_needed(running.network, p.inhibition, p.voting, running.span)
-    certificate = certify(running)
-    suggestion = suggest.suggest_gains(running) if options.suggest else None
+    p, of, of_gait = suite.parameters, running(suite), running_setting(suite)
+    needed = votes.votes_needed(of_gait.network, p.inhibition, p.voting, of_gait.span)
+    certificate = of.certificate(whole=True)
+    suggestion = suggest.suggest_gains(of) if options.suggest else None
     if options.proof is not None and certificate.holds:
-        if p.voting.voting or p.canonical.contact_feedback:
-            raise ParameterError('voting and contact_feedback have no exact proof; --proof needs '
-                                 'both to be off')
-        write_json(options.proof, proof.proof_of(running))
+        if p.voting.voting or p.canonical.contact_feedback or of.others:
+            raise ParameterError('voting, contact_feedback and auto_gait have no exact proof; '
+                                 '--proof needs all of them to be off')
+        write_json(options.proof, proof.proof_of(of_gait))
     if options.json:
         content = _mapping(suite, certificate, needed)
         if options.suggest:
@@ -67,23 +68,37 @@ def _certify(options: argparse.Namespace, ros: RosArguments) -> int:
                 name: getattr(suggestion, name) for name in ('coupling_gain', 'inhibition_gain')}
         print(to_json(content), end='')
     else:
-        lines = _report(suite, certificate, needed)
+        lines = _report(suite, of, certificate, needed)
         print('\n'.join([*lines, '', *_suggested(suggestion)] if options.suggest else lines))
     for entry in certificate.failing:
         print(f'certify: fails: {entry.explained()}', file=sys.stderr)
     return HOLDS if certificate.holds else FAILS
 
 
+def running(suite: Suite) -> Running:
+    """What the nodes of a suite compute their certificate from, other gaits included that they
+    choose among; raises ParameterError for one that there is not.
+    """
+    from dmp_cpg_ros.robot.model_reader import load_description
+
+    choice, scale = suite.parameters.gait_choice, body_scale(load_description(suite.robot_file))
+    chosen = [suite.gaits.named(name) for name in choice.auto_gaits if choice.auto_gait]
+    others = tuple(gait for gait in chosen if gait.name != suite.gait.name)
+    return Running(suite.parameters, suite.gait, scale, suite.tick_ns * 1e-9, others)
+
+
 def running_setting(suite: Suite) -> Setting:
-    """What the certificate of a suite is computed from."""
+    """What the certificate of the gait that a suite names is computed from."""
     from dmp_cpg_ros.robot.model_reader import load_description
 
     p, scale = suite.parameters, body_scale(load_description(suite.robot_file))
     return Setting.of(GaitNetwork(p.canonical, suite.gait, scale), p, suite.tick_ns * 1e-9)
 
 
-def _report(suite: Suite, certificate: Certificate, needed: votes.VotesNeeded) -> list[str]:
-    lines = [f'{suite.file}: {suite.gait.name} at up to {certificate.omega_max:.4g} rad/s, '
+def _report(suite: Suite, of: Running, certificate: Certificate, needed: votes.VotesNeeded
+            ) -> list[str]:
+    gaits = ', '.join(gait.name for gait in (of.gait, *of.others))
+    lines = [f'{suite.file}: {gaits} at up to {certificate.omega_max:.4g} rad/s, '
              f'{1e9 / suite.tick_ns:g} Hz', '', *_table(certificate.inequalities)]
     if certificate.rest_phase:
         at_rest = ', '.join(
@@ -103,7 +118,7 @@ def _report(suite: Suite, certificate: Certificate, needed: votes.VotesNeeded) -
         lines += ['', f"auto takes one of {', '.join(certificate.legs)}, each of them certified"
                   + (f"; {', '.join(others)} cannot hold the gait alone" if others else '')]
     return [*lines, '', f'from a request on the reference goes at most '
-            f'{certificate.distance_to_rest:.4g} m, at its largest speed', '',
+            f'{no_less(certificate.distance_to_rest)} m, at its largest speed', '',
             f'voting is {voting}; {_votes(needed)}',
             f'gains of each from which 1, 2, ... votes certainly stop it: {enough} 1/s; below '
             f'which they cannot: {too_weak} 1/s', '', f'certificate: {verdict}']

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dmp_cpg_ros.commands import ros_arguments, run_folder
-from dmp_cpg_ros.commands.certify import running_setting
+from dmp_cpg_ros.commands.certify import running
 from dmp_cpg_ros.configuration import (
     ROBOTS,
     SCENARIOS,
@@ -26,9 +26,9 @@ from dmp_cpg_ros.configuration import (
     naming,
     unused_sections,
 )
-from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
+from dmp_cpg_ros.core.maths.rounding import no_less
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.primitive_files import motion_overrides
 from dmp_cpg_ros.suite import Suite, load_suite
@@ -122,7 +122,7 @@ def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _P
                              'failures_allowed:=true')
     if 'votes' in events and not suite.parameters.voting.voting:
         raise ParameterError(f"scenario '{scenario.name}' votes, which needs voting:=true")
-    certificate = certify(running_setting(suite))
+    certificate = running(suite).certificate(whole=True)
     if not certificate.holds and not overrides.get('allow_uncertified', False):
         raise ParameterError(
             f'the gait is not certified to stop: {certificate.explained()} (certify --suggest '
@@ -147,7 +147,7 @@ def _walk(plan: _Plan, server: ForkServer) -> int:
           f'{SHARED[options.processes]}, '
           f'{1e9 / plan.suite.tick_ns:g} Hz', flush=True)
     print(f'certificate: {plan.certificate.explained()}; {plan.certificate.contraction_grade} '
-          f'grade; at rest at most {plan.certificate.time_to_rest:.3f} s after a request',
+          f'grade; at rest at most {no_less(plan.certificate.time_to_rest)} s after a request',
           flush=True)
     made = 'metrics' if options.no_report else 'report'
     status, ending = _run(plan, folder, server)

@@ -34,6 +34,18 @@ def test_the_packages_own_parameters_hold(capsys: pytest.CaptureFixture[str]) ->
     assert 'certificate: holds' in out and 'capture' in out and 'k_inh = 400' in out
 
 
+def test_gaits_that_are_chosen_are_certified_together_as_the_nodes_do(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    chosen = ['--ros-args', '-p', 'gait:=walk', '-p', 'auto_gaits:=[walk, bound]', '-p']
+    assert main([*chosen, 'inhibition_gain:=210.0']) == 0
+    assert ': walk at up to' in capsys.readouterr().out
+    assert main([*chosen, 'inhibition_gain:=210.0', '-p', 'auto_gait:=true']) == 1
+    told = capsys.readouterr()
+    assert ': walk, bound at up to' in told.out and 'fails: capture' in told.err
+    assert main(['--proof', str(tmp_path / 'proof.json'), *chosen, 'auto_gait:=true']) == 2
+    assert 'auto_gait' in capsys.readouterr().err
+
+
 @pytest.mark.parametrize('gait', ['walk', 'trot', 'pace', 'bound', 'pronk'])
 def test_every_gait_can_be_certified(gait: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(['--ros-args', '-p', f'gait:={gait}']) == 0

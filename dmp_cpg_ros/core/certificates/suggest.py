@@ -6,13 +6,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.inequality import Certificate
-from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.maths.roots import last_that_holds
-from dmp_cpg_ros.core.voting.parameters import VotingParameters
+
+if TYPE_CHECKING:
+    from dmp_cpg_ros.core.certificates.gate import Running
 
 MARGIN = 1.25
 """Factor by which a suggested gain exceeds what its inequality needs."""
@@ -45,13 +46,13 @@ class Suggestion:
     changed: bool
 
 
-def suggest_gains(s: Setting) -> Suggestion | None:
+def suggest_gains(running: Running) -> Suggestion | None:
     """Raise the gains, inhibition before coupling, until the certificate holds.
 
     Parameters
     ----------
-    s : Setting
-        What runs.
+    running : Running
+        What is to run.
 
     Returns
     -------
@@ -59,27 +60,22 @@ def suggest_gains(s: Setting) -> Suggestion | None:
         The present gains when they hold; None when an inequality fails that gains cannot mend, or
         no gains within the parameters' ranges are enough.
     """
-    network, p = s.network, s.parameters
+    def at(k: float, k_inh: float) -> Running:
+        return running.changed({'coupling_gain': k, 'inhibition_gain': k_inh})
 
-    def at(k: float, k_inh: float, whole: bool = True) -> Certificate:
-        return certify(Setting.of(
-            network.with_parameters(replace(network.parameters, coupling_gain=k)),
-            replace(p, inhibition=replace(p.inhibition, inhibition_gain=k_inh),
-                    voting=p.voting if whole else VotingParameters()), s.tick_s),
-            required_only=not whole)
-
-    k0, k_inh0 = network.parameters.coupling_gain, p.inhibition.inhibition_gain
-    present, k = at(k0, k_inh0), k0
+    of = running.parameters
+    k0, k_inh0 = of.canonical.coupling_gain, of.inhibition.inhibition_gain
+    present, k = running.certificate(whole=True), k0
     if present.holds:
         return Suggestion(k0, k_inh0, present, False)
     while k <= _LARGEST_COUPLING:
         k_inh = k_inh0
         while k_inh <= _LARGEST_INHIBITION:
-            found = at(k, k_inh, whole=False)
+            found = at(k, k_inh).changed({'voting': False}).certificate()
             if found.holds and (k == k0 or all(
                     MARGIN * found[name].left <= found[name].right
                     for name in ('synchronisation', 'contraction'))):  # those of the coupling
-                found = at(k, k_inh)
+                found = at(k, k_inh).certificate(whole=True)
                 if found.holds:
                     return Suggestion(k, k_inh, found, True)
                 break  # the votes of some legs may still need stronger couplings

@@ -13,6 +13,7 @@ from core_examples import GAITS, TICK, network
 from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify, spring_damper_contraction
+from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.suggest import nearest_values, suggest_gains
@@ -150,8 +151,8 @@ def test_joints_contract_at_their_slowest_eigenvalue(stiffness: float, damping: 
     ('all_to_all', 100.0, 100.0), ('path', 10.0, 400.0), ('ring', 5.0, 50.0), ('star', 8.0, 10.0)])
 def test_suggested_gains_hold(graph: str, gain: float, inhibition_gain: float) -> None:
     p = with_inhibition(inhibition_gain=inhibition_gain)
-    start = network('amble', coupling_graph=graph, coupling_gain=gain)
-    found = suggest_gains(Setting.of(start, p, TICK))
+    found = suggest_gains(Running(p, GAITS['amble'], network().scale, TICK).changed(
+        {'coupling_graph': graph, 'coupling_gain': gain}))
     assert found is not None and found.changed and found.certificate.holds
     again = certificate(
         suite=with_inhibition(inhibition_gain=found.inhibition_gain), coupling_graph=graph,
@@ -160,11 +161,20 @@ def test_suggested_gains_hold(graph: str, gain: float, inhibition_gain: float) -
 
 
 def test_gains_that_hold_are_kept_and_what_gains_cannot_mend_is_not_promised() -> None:
-    p = SuiteParameters()
-    kept = suggest_gains(Setting.of(network(), p, TICK))
+    running = Running(SuiteParameters(), GAITS['amble'], network().scale, TICK)
+    kept = suggest_gains(running)
     assert kept is not None and not kept.changed
-    never = with_inhibition(capture_speed=0.0)
-    assert suggest_gains(Setting.of(network(), never, TICK)) is None
+    assert suggest_gains(running.changed({'capture_speed': 0.0})) is None
+
+
+def test_gains_are_suggested_for_all_gaits_that_are_walked() -> None:
+    running = Running(SuiteParameters(), GAITS['walk'], network().scale, TICK).changed(
+        {'inhibition_gain': 210.0})
+    assert running.certificate().holds
+    both = replace(running, others=(GAITS['bound'],))
+    found = suggest_gains(both)
+    assert found is not None and found.changed and both.changed(
+        {'coupling_gain': found.coupling_gain, 'inhibition_gain': found.inhibition_gain}).holds()
 
 
 def test_the_nearest_value_that_works_works_and_a_little_further_does_not() -> None:

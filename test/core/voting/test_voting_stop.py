@@ -15,6 +15,7 @@ from standing_run import Run, walking
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.changes import certify_changes
+from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.suggest import suggest_gains
@@ -256,11 +257,11 @@ def test_gains_are_suggested_with_which_votes_are_certified_too() -> None:
     p = SuiteParameters(**voters(inhibited_legs=LEGS[:3]))
     running = Setting.of(network('pronk', coupling_gain=5.0), p, TICK)
     assert [entry.name for entry in certify(running).failing] == ['votes_needed']
-    found = suggest_gains(running)
+    pronk = Running(p, GAITS['pronk'], network().scale, TICK)
+    found = suggest_gains(pronk.changed({'coupling_gain': 5.0}))
     assert found is not None and found.changed and found.certificate['votes_needed'].holds
-    fast = replace(p.inhibition, capture_speed=1.0)          # minorities meet slower legs
-    assert suggest_gains(Setting.of(
-        network(coupling_graph='path'), replace(p, inhibition=fast), TICK)) is None
+    fast = {'capture_speed': 1.0, 'coupling_graph': 'path'}  # minorities meet slower legs
+    assert suggest_gains(replace(pronk, gait=GAITS['amble']).changed(fast)) is None
 
 
 def test_nobody_is_certain_to_stop_legs_that_are_not_coupled_enough() -> None:
