@@ -154,6 +154,25 @@ class Inhibition:
         return np.where(inside, self.gains, 0.0)
 
 
+def joined_gains(gains: Array, others: Array, held: bool) -> Array:
+    """The larger of two gains on each node, ndarray (N,) [1/s].
+
+    Nodes of the largest gain act together or not at all, so that no other may become one of those
+    that hold the network now: it need not be in its region.
+
+    Parameters
+    ----------
+    gains, others : ndarray (N,)
+        Gains that act, and those that join them [1/s].
+    held : bool
+        Whether the first hold the network.
+    """
+    joined, top = np.maximum(gains, others), gains.max()
+    if held and top > 0.0:
+        joined = np.where((joined == top) & (gains < top), np.nextafter(top, 0.0), joined)
+    return joined
+
+
 def initial_inhibition(parameters: InhibitionParameters, leg: int = 0) -> Inhibition:
     """Inhibition before the first request: armed when the gait starts at rest, on a leg where it
     is chosen.

@@ -143,9 +143,9 @@ class Running:
                     x: Array) -> str:
         """Why a change of what captures the legs has to wait; empty when it may be made.
 
-        While the gait runs every certified change may: inhibition sets in when the legs are in
-        their places. In a stop that holds them, the state must be in the invariant set of the new
-        parameters, or the legs would break free and take a stride; votes have no such set.
+        While the gait runs every certified change may. Once inhibition is armed legs may be caught
+        at any time; at rest the state must be in the invariant set of the new parameters, or the
+        legs would break free and take a stride. Votes have no such set.
 
         Parameters
         ----------
@@ -158,13 +158,14 @@ class Running:
         x : ndarray (4, 2)
             States.
         """
-        acting = network.acting_gains(inhibition, x)
-        served = before.parameters.inhibition.gains_on(int(acting.argmax())) > 0.0
+        acting, armed = network.acting_gains(inhibition, x), inhibition.gains
+        held_by = acting if acting.any() else armed
+        served = before.parameters.inhibition.gains_on(int(held_by.argmax())) > 0.0
         # the service's gain is above that of any vote, whatever it was when it was asked for
-        voted = bool(acting[served].min(initial=math.inf) <= acting[~served].max(initial=0.0))
+        voted = bool(held_by[served].min(initial=math.inf) <= held_by[~served].max(initial=0.0))
         names = sorted((_CAPTURING | {'cadence_scale'} if voted else _CAPTURING)
                        & before.differences(self).keys())
-        if not (names and inhibition.requested and acting.any()):
+        if not (names and inhibition.requested and armed.any()):
             return ''
         if voted:
             return (f'{", ".join(names)} cannot change while votes alone hold the legs; ask again '

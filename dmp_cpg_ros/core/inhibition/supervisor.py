@@ -24,7 +24,11 @@ from math import hypot, isfinite
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
+from dmp_cpg_ros.core.canonical.inhibition import (
+    Inhibition,
+    InhibitionParameters,
+    joined_gains,
+)
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
 from dmp_cpg_ros.core.clock import time_step
 from dmp_cpg_ros.core.gait.gait import Gait
@@ -115,7 +119,12 @@ class GaitSupervisor:
             return np.zeros(len(LEGS)) if state.push.acts else state.tally.gains
         gains = (self.parameters.gains_on(state.leg) if armed and state.asked
                  else np.zeros(len(LEGS)))
-        return np.maximum(gains, state.vote_gains) if armed and state.voted else gains
+        return joined_gains(gains, state.vote_gains, self._holds(state)) if (
+            armed and state.voted) else gains
+
+    @staticmethod
+    def _holds(state: SupervisorState) -> bool:
+        return state.armed and state.state in ('captured', 'at_rest')
 
     def request(self, state: SupervisorState, stop: bool, automatic: bool = False
                 ) -> SupervisorState:
@@ -252,7 +261,7 @@ class GaitSupervisor:
             return self._turned(replace_unchecked(state, voted=False))
         gains = state.vote_gains
         if self.voting.vote_rule == SUM and np.any(tally.gains > gains):
-            gains = np.maximum(tally.gains, gains)
+            gains = joined_gains(gains, tally.gains, self._holds(state))
         if not (state.asked or holds_at_rest(network, gains, self.parameters.region_radius)):
             # parameters or cadence have changed: what the votes asked for, the service's gain does
             gains = np.maximum(gains, self.parameters.gains_on(state.leg))
@@ -289,9 +298,7 @@ class GaitSupervisor:
         if not self.parameters.auto and self.parameters.armed_gains[state.leg] == 0.0:
             # auto keeps what holds when it takes over in this stop
             state = replace_unchecked(state, leg=int(self.parameters.armed_gains.argmax()))
-        # legs that come in are asked anew whether they may: parameters may have changed meanwhile
-        held = state.armed and state.state in ('captured', 'at_rest')
-        armed = inside = held and self._inside(state, network, x)
+        armed = inside = state.armed and self._inside(state, network, x)
         if not inside:
             most = armed_speed(network.scale, self.parameters, self.reference)
             armed = speed <= most and self.in_places(network, x)

@@ -20,8 +20,8 @@ ROBOT = quadruped()
 class Walk:
     """The oscillators of the suite with what drives and stops them, without a body."""
 
-    def __init__(self, gait: str = 'amble', **parameters: Any) -> None:
-        self.loop = Oscillators(ROBOT, {'gait': gait, 'tick_s': TICK, 'parameters': {
+    def __init__(self, gait: str = 'amble', tick_s: float = TICK, **parameters: Any) -> None:
+        self.loop = Oscillators(ROBOT, {'gait': gait, 'tick_s': tick_s, 'parameters': {
             'auto_inhibit': False, **parameters}})
         self.left_region = 0
         self.turned = np.zeros(4)
@@ -35,7 +35,7 @@ class Walk:
         self.left_region += held and loop.inhibition.requested and not loop.held
 
     def run(self, seconds: float) -> None:
-        for _ in range(round(seconds / TICK)):
+        for _ in range(round(seconds / self.loop.tick_ns * 1e9)):
             self.tick()
 
     def walk(self, speed: float, seconds: float) -> None:
@@ -221,6 +221,28 @@ def test_legs_that_votes_hold_are_not_let_go_by_who_asks_for_the_stop_too(
     assert walk.loop.stop.state == 'walking'
 
 
+@pytest.mark.parametrize(('first', 'then'), [
+    ('service', ('fr', 'rl', 'rr')), (('fr', 'rl', 'rr'), ('fl',)),
+    (('fr', 'rl', 'rr'), 'service')], ids=str)
+@pytest.mark.parametrize('limit', [0.0, 1.0])
+def test_who_joins_a_stop_does_not_let_go_of_the_legs_that_others_hold(
+        first: str | tuple[str, ...], then: str | tuple[str, ...], limit: float) -> None:
+    def stop(who: str | tuple[str, ...]) -> None:
+        if who == 'service':
+            walk.loop.request(True)
+        else:
+            walk.loop.vote(dict.fromkeys(who, 10.0))
+        walk.run(2.5)
+        assert walk.loop.stop.state == 'at_rest'
+
+    walk = Walk(**VOTED, vote_limit=limit, vote_majority=1 if limit else 3)
+    walk.walk(0.3, 2.0)
+    stop(first)
+    walk.turned[:] = 0.0
+    stop(then)
+    assert np.abs(walk.turned).max() < np.radians(90.0)
+
+
 @pytest.mark.parametrize('wait', [0.0, 0.004, 0.1, 0.6])
 def test_a_gain_for_the_gait_that_is_wanted_waits_until_it_is_walked(wait: float) -> None:
     walk = Walk('bound', capture_speed=2.0)
@@ -249,24 +271,19 @@ def test_legs_are_caught_at_a_cadence_that_the_limits_of_commands_allow(wait: fl
     assert measured == pytest.approx(predicted, abs=1e-9)
 
 
-def test_legs_that_come_to_their_region_are_caught_as_the_parameters_of_then_allow() -> None:
-    def stopping(ticks: int) -> Walk:
-        walk = Walk('trot', capture_speed=3.0)
-        walk.walk(3.0, 3.0)
-        walk.loop.request(True)
-        for _ in range(ticks):
-            walk.tick()
-        return walk
-
-    walk, ticks = stopping(0), 0
-    while walk.loop.stop.state != 'captured':
+@pytest.mark.parametrize('tick_s', [0.004, 0.01])
+def test_what_captures_cannot_change_from_when_legs_may_be_caught(tick_s: float) -> None:
+    walk = Walk('trot', tick_s, capture_speed=3.0)
+    walk.walk(3.0, 3.0)
+    walk.loop.request(True)
+    while not walk.loop.stop.armed:
         walk.tick()
-        ticks += 1
-    walk = stopping(ticks - 1)
-    assert walk.loop.stop.armed and not walk.loop.held
-    assert accepted(walk, **SLOW) and accepted(walk, inhibition_gain=162.0)
-    walk.run(2.0)
+    assert walk.loop.stop.state == 'waiting'
+    assert accepted(walk, **SLOW)                            # armed at 2 m/s, which is caught
+    assert 'being captured' in walk.loop.change({'inhibition_gain': 162.0})
+    walk.run(4.0)
     assert walk.loop.stop.state == 'at_rest' and walk.left_region == 0
+    assert accepted(walk, inhibition_gain=162.0)
 
 
 def test_a_stop_within_limits_of_zero_is_bounded() -> None:
