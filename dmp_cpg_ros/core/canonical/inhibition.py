@@ -167,9 +167,11 @@ def joined_gains(gains: Array, others: Array, held: bool) -> Array:
     held : bool
         Whether the first hold the network.
     """
-    joined, top = np.maximum(gains, others), gains.max()
-    if held and top > 0.0:
-        joined = np.where((joined == top) & (gains < top), np.nextafter(top, 0.0), joined)
+    joined, holding = np.maximum(gains, others), gains == gains.max()
+    if held and gains.any():
+        largest = joined == joined.max()
+        if (largest & holding).any():  # else those that join act together, and not with these
+            joined = np.where(largest & ~holding, np.nextafter(joined.max(), 0.0), joined)
     return joined
 
 

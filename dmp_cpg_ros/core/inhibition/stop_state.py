@@ -87,6 +87,11 @@ class SupervisorState:
         """Whether a stop is in force, a push or not: the reference is zero."""
         return self.requested or self.push.acts
 
+    @property
+    def holds(self) -> bool:
+        """Whether inhibition holds the legs."""
+        return self.armed and self.state in ('captured', 'at_rest')
+
     def carried(self, now_ns: int) -> SupervisorState:
         """The same on a clock that was set back, see :func:`~dmp_cpg_ros.core.clock.carried`."""
         idle_ns, request_ns = (carried(stamp, self.time_ns, now_ns)

@@ -119,12 +119,8 @@ class GaitSupervisor:
             return np.zeros(len(LEGS)) if state.push.acts else state.tally.gains
         gains = (self.parameters.gains_on(state.leg) if armed and state.asked
                  else np.zeros(len(LEGS)))
-        return joined_gains(gains, state.vote_gains, self._holds(state)) if (
+        return joined_gains(gains, state.vote_gains, state.holds) if (
             armed and state.voted) else gains
-
-    @staticmethod
-    def _holds(state: SupervisorState) -> bool:
-        return state.armed and state.state in ('captured', 'at_rest')
 
     def request(self, state: SupervisorState, stop: bool, automatic: bool = False
                 ) -> SupervisorState:
@@ -133,9 +129,11 @@ class GaitSupervisor:
         A service call that asks for a start ends a stop by votes too, once nobody votes any more.
         What an obstacle asked for is asked for by whoever asks next.
         """
-        voted = state.voted and (stop or automatic or state.tally.alive)
+        voted, gains = state.voted and (stop or automatic or state.tally.alive), state.vote_gains
+        if state.asked and not stop and voted and state.armed:  # what holds the legs stays
+            gains = self._gains(state, True)
         state = replace_unchecked(state, asked=stop, automatic=automatic, voted=voted,
-                                  block=NO_BLOCK)
+                                  vote_gains=gains, block=NO_BLOCK)
         if state.push.acts and not (stop or voted):
             state = replace_unchecked(state, push=NO_PUSH, requested=True)
         return self._turned(state)
@@ -261,7 +259,7 @@ class GaitSupervisor:
             return self._turned(replace_unchecked(state, voted=False))
         gains = state.vote_gains
         if self.voting.vote_rule == SUM and np.any(tally.gains > gains):
-            gains = joined_gains(gains, tally.gains, self._holds(state))
+            gains = joined_gains(gains, tally.gains, state.holds)
         if not (state.asked or holds_at_rest(network, gains, self.parameters.region_radius)):
             # parameters or cadence have changed: what the votes asked for, the service's gain does
             gains = np.maximum(gains, self.parameters.gains_on(state.leg))

@@ -235,11 +235,14 @@ def test_who_joins_a_stop_does_not_let_go_of_the_legs_that_others_hold(
         walk.run(2.5)
         assert walk.loop.stop.state == 'at_rest'
 
-    walk = Walk(**VOTED, vote_limit=limit, vote_majority=1 if limit else 3)
+    walk = Walk(**{**VOTED, 'vote_fade': 30.0}, vote_limit=limit, vote_majority=1 if limit else 3)
     walk.walk(0.3, 2.0)
     stop(first)
     walk.turned[:] = 0.0
     stop(then)
+    walk.loop.request(False)
+    walk.run(1.0)
+    assert walk.loop.stop.state == 'at_rest'                 # held by votes
     assert np.abs(walk.turned).max() < np.radians(90.0)
 
 
