@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,21 @@ STRIDE = np.radians(200.0)
 """Turn of a leg at rest that counts as a stride [rad]: more than it may rest ahead."""
 
 
+class _Expected(NamedTuple):
+    """What is promised of a stop or a start: since when [ns], and times and way from then on."""
+
+    since_ns: int
+    stop: bool
+    bound_s: float
+    predicted_s: float
+    bound_m: float = np.inf
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """States in which it is done."""
+        return ('at_rest',) if self.stop else ('walking', 'free')
+
+
 def play(description: RobotDescription, case: Case, weaken: str = '', counts: Counter[str] | None
          = None) -> tuple[str, float]:
     """Run a case to its end.
@@ -39,7 +54,8 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
         The robot.
     case : dict
         ``gait``, ``tick_s``, ``parameters`` by name, and ``events``: lists of a wait [s], a kind
-        (``stop``, ``start``, ``command``, ``set``, ``gait``, ``vote``, ``push``) and a value.
+        (``stop``, ``start``, ``command``, ``set``, ``gait``, ``vote``, ``push``, ``take_over``)
+        and a value.
     weaken : str
         What is left out, one of ``CONDITIONS``.
     counts : Counter, optional
@@ -53,8 +69,8 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
         Largest share of a bound that was needed.
     """
     counts = Counter() if counts is None else counts
-    loop, closest = Oscillators(description, case, weaken), 0.0
-    expected: tuple[int, float, float] | None = None         # since, bound, prediction
+    loop, closest, way = Oscillators(description, case, weaken), 0.0, 0.0
+    expected: _Expected | None = None
     turned, resting = np.zeros(4), False
     for wait, kind, value in [*case['events'], [0.0, 'stop', None], [LONGEST, 'end', None]]:
         for _ in range(round(wait / case['tick_s'])):
@@ -66,6 +82,7 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
                 moved = np.zeros(4)
             turned = turned + moved if resting and loop.stop.requested else np.zeros(4)
             resting = loop.stop.requested and (resting or loop.stop.state == 'at_rest')
+            way += case['tick_s'] * float(np.hypot(*loop.r[:2]))
             if not np.all(np.isfinite(loop.x)):
                 return 'the oscillators diverge', closest
             if held and loop.inhibition.requested and not loop.held:
@@ -76,41 +93,64 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
                 if kind == 'end' and loop.stop.state == 'at_rest':
                     break
                 continue
-            since = (loop.now_ns - expected[0]) * 1e-9
-            if loop.stop.state == 'at_rest':
-                closest = max(closest, since / expected[1])
-                if since > expected[1] + 1e-9:
-                    return f'at rest after {since:.3f} s, at most {expected[1]:.3f}', closest
-                if abs(since - expected[2]) > 1e-6:
-                    return f'at rest after {since:.3f} s, predicted {expected[2]:.3f}', closest
+            told, share = _kept(loop, expected, way, case['tick_s'])
+            if told:
+                return told, closest
+            closest = max(closest, share)
+            if loop.stop.state in expected.words:
                 expected = None
                 if kind == 'end':
                     break
-            elif since > expected[1] + case['tick_s'] * 1.5:
-                return f'not at rest after {since:.3f} s, at most {expected[1]:.3f}', closest
         resting = resting and kind != 'start'
         counts[kind] += kind != 'end'
         if kind != 'end':
-            expected = _do(loop, kind, value, expected, counts)
+            former, expected = expected, _do(loop, kind, value, expected, counts)
+            way = way if expected is former else 0.0
     return ('' if loop.stop.state == 'at_rest' else 'the last stop does not end'), closest
 
 
-def _do(loop: Oscillators, kind: str, value: Any, expected: tuple[int, float, float] | None,
-        counts: Counter[str]) -> tuple[int, float, float] | None:
-    """Do what an event says; what is expected of the stop that it asks for."""
-    if kind == 'stop' and not loop.stop.requested:
+def _kept(loop: Oscillators, expected: _Expected, way: float, tick_s: float) -> tuple[str, float]:
+    """What is wrong of what is promised; and the share of the bound that a stop has needed."""
+    since, what = (loop.now_ns - expected.since_ns) * 1e-9, expected.words[0]
+    if way > expected.bound_m + 1e-9:
+        return f'goes on for {way:.4f} m, at most {expected.bound_m:.4f}', 0.0
+    if loop.stop.state not in expected.words:
+        late = since > expected.bound_s + tick_s * 1.5
+        return (f'not {what} after {since:.3f} s, at most {expected.bound_s:.3f}' if late else ''
+                ), 0.0
+    if since > expected.bound_s + 1e-9:
+        return f'{what} after {since:.3f} s, at most {expected.bound_s:.3f}', 0.0
+    if abs(since - expected.predicted_s) > 1e-6:
+        return f'{what} after {since:.3f} s, predicted {expected.predicted_s:.3f}', 0.0
+    return '', since / expected.bound_s if expected.stop else 0.0
+
+
+def _do(loop: Oscillators, kind: str, value: Any, expected: _Expected | None,
+        counts: Counter[str]) -> _Expected | None:
+    """Do what an event says; what is expected of the stop or the start that is under way."""
+    if loop.inhibition.requested if kind == 'take_over' else (
+            kind == 'stop' and not loop.stop.requested):
         bound = loop.time_to_rest() if loop.certified() else np.inf
-        predicted = loop.request(True)
-        return loop.now_ns, bound, predicted if predicted < np.inf else LONGEST
-    if kind == 'stop':
+        way = loop.in_force().stop_distance(loop.r, loop.gate.foreseen(loop.now_ns + loop.tick_ns))
+        predicted = loop.take_over() if kind == 'take_over' else loop.request(True)
+        predicted = min(predicted, LONGEST) if not loop.voted_now else np.nan
+        return _Expected(loop.now_ns, True, bound, predicted, way)
+    if kind in ('stop', 'take_over'):
         return expected
     if kind == 'start':
-        loop.request(False)
-        return None
+        bound = loop.in_force().certificate().time_to_walking if loop.certified() else np.inf
+        news = loop.stop.requested
+        predicted = loop.request(False)
+        if not news or loop.stop.requested or predicted == np.inf:
+            return None
+        return _Expected(loop.now_ns, False, bound, predicted)
     if kind == 'command':
         loop.command(*value)
-        if expected is not None and expected[0] == loop.now_ns:
-            return *expected[:2], np.nan             # it acts for the tick until the request does
+        if expected is not None and not expected.stop:
+            return None
+        if expected is not None and expected.since_ns == loop.now_ns:
+            # it acts for the tick until the request does
+            return expected._replace(predicted_s=np.nan, bound_m=np.inf)
     elif kind == 'vote':
         loop.vote(value)
         return None
@@ -122,7 +162,7 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: tuple[int, float, fl
         except DmpCpgError:
             accepted = False
         counts['accepted'] += accepted
-        # What was said of a stop holds for the parameters that it was said for.
+        # What was said holds for the parameters that it was said for.
         return None if accepted else expected
     return expected
 
@@ -191,8 +231,9 @@ def random_events(rng: np.random.Generator, voting: bool, weaken: str = '') -> l
     if rng.random() < 0.6:
         return events + _telling(rng, voting)
     for _ in range(rng.integers(3, 14)):
-        kind = str(rng.choice(['stop', 'start', 'change', 'command', 'vote', 'push'],
-                              p=(0.3, 0.22, 0.27, 0.08, 0.03, 0.1)))
+        kind = str(rng.choice(
+            ['stop', 'start', 'change', 'command', 'vote', 'push', 'take_over'],
+            p=(0.28, 0.22, 0.27, 0.08, 0.03, 0.08, 0.04)))
         value: Any = None
         if kind == 'change':
             kind, value = _changing(rng)
@@ -204,7 +245,8 @@ def random_events(rng: np.random.Generator, voting: bool, weaken: str = '') -> l
             value = _votes(rng)
         elif kind == 'push':
             value = _push(rng)
-        events.append([log_uniform(rng, 0.004, 3.0), kind, value])
+        same = rng.random() < 0.2                            # within the tick of the one before
+        events.append([0.0 if same else log_uniform(rng, 0.004, 3.0), kind, value])
     return events
 
 
@@ -233,7 +275,7 @@ def _telling(rng: np.random.Generator, voting: bool, about: int | None = None
         return _change(rng, names)
 
     def soon() -> float:
-        return log_uniform(rng, 0.004, 0.6)
+        return log_uniform(rng, 0.004, 0.6) if rng.random() < 0.8 else 0.0
 
     if voting and rng.random() < 0.7:                        # changes while votes hold the gait
         return [entry for _ in range(2) for entry in (
@@ -243,9 +285,12 @@ def _telling(rng: np.random.Generator, voting: bool, about: int | None = None
     if kind == 0:                                            # stops within starts
         return [entry for _ in range(3) for entry in (
             [2.0, 'stop', None], [2.0, 'start', None], [soon(), 'stop', None],
-            [soon(), 'start', None], [soon(), 'stop', None])]
+            [soon(), 'start', None], [soon(), 'stop', None], [soon(), 'take_over', None])]
     if kind == 1:                                            # what acts is not what was accepted
-        return [[1.5, 'set', change('cadence_scale')],
+        first = [1.5, 'set', change('cadence_scale')] if about is not None else (
+            [[1.5, 'set', change('cadence_scale')], [1.5, 'gait', str(rng.choice(list(GAITS)))],
+             [1.5, 'set', change('max_speed') | _LIMITS]][rng.integers(3)])
+        return [first,
                 [soon(), 'set', change('inhibition_gain', 'region_radius', 'cadence_scale')],
                 [soon(), 'stop', None], [3.0, 'start', None],
                 [1.0, 'set', change('cadence_scale')], [soon(), 'stop', None]]

@@ -16,6 +16,8 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.handover import adopted
+from dmp_cpg_ros.core.inhibition.prediction import look_ahead
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.maths import Array
@@ -46,6 +48,7 @@ class Oscillators(WalkingLoop):
                          start.changed(case['parameters']).parameters, GAITS)
         self._dt, self._weaken, self.now_ns = case['tick_s'], weaken, 0
         self._margins, self._pushed_until_ns = (np.inf,) * 4, 0
+        self._voted_ns = -1
         nothing = np.full(3, np.nan)
         self._sensors = VoteSensors(0, 0, np.full(4, 0.25), nothing, nothing)
         self._leave_out_places()
@@ -77,6 +80,26 @@ class Oscillators(WalkingLoop):
         if self._weaken == 'arming':
             return self.in_force().certificate().time_to_rest
         return super().time_to_rest()
+
+    def take_over(self) -> float:
+        """Let another one watch the stop from now on, who knows what acts and no votes; returns
+        the time to rest that it predicts [s].
+        """
+        self.stop = adopted(self.inhibition, self.now_ns, self.supervisor.parameters)
+        self.votes = self.voting.initial_state(self.network)
+        return look_ahead(
+            self.supervisor, self.reference, self.canonical, self.stop, self.inhibition,
+            self.canon, self.r, self.gate.foreseen(self.now_ns + self.tick_ns), self._dt).time_s
+
+    def vote(self, weights: Mapping[str, float], voter: str = '') -> None:
+        """Vote for a stop; no prediction of before the next tick knows of it."""
+        super().vote(weights, voter)
+        self._voted_ns = self.now_ns
+
+    @property
+    def voted_now(self) -> bool:
+        """Whether somebody has voted since the last tick."""
+        return self._voted_ns == self.now_ns
 
     def push(self, margin: float, duration: float) -> None:
         """Let the body be disturbed: the least margin of its capture point [m], for a time [s]."""
