@@ -74,14 +74,18 @@ class LegTransformation(SuiteNode):
             self.warn('feedback', f'no posture_feedback since {told_ns * 1e-9:.3f} s: the robot '
                       'has to stop by itself', error=True)
             return
-        self.clear('feedback')
+        elapsed = self.elapsed
+        if self.health.has_problem('feedback'):
+            self.clear('feedback')
+            if not feedback.command.balanced:  # the drives may have moved the joints meanwhile
+                self._state, elapsed = self._leg.initial_state(), 0.0
         if not self._joined:
             self._joined = True
             if self.lock_step and stamp_ns > 0:
                 self._state = self._leg.picked_up(gait, x, x_dot, values['reference'], feedback)
         state, targets = self._leg.step(
             self._state, gait, x, x_dot, values['reference'], feedback, position, velocity,
-            self.elapsed)
+            elapsed)
         message = self._writer.fill(stamp_ns, targets)  # refuses what is not finite
         self._state = state
         self._publisher.publish(message)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
+from dmp_cpg_ros.core.balance.body_command import BodyCommand
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
@@ -294,6 +296,27 @@ def test_a_leg_without_feedback_of_the_posture_says_nothing(ros: Ros) -> None:
             'posture_feedback': (state.time_ns - age, tick.feedback)})
         assert bool(sent) != silent and leg.health.has_problem('feedback') == silent
     leg.destroy_node()
+
+
+def test_a_leg_that_was_without_feedback_on_the_way_up_goes_on_from_where_its_joints_are(
+        ros: Ros) -> None:
+    """The robot has lowered itself meanwhile, and follows only what rests where it is."""
+    _, state, tick = walked(10)
+    leg, sent = LegTransformation('leg_transformation_fl', context=ros.context), []
+    ros.nodes.append(leg)
+    leg.start()
+    leg._writer.fill = lambda _, targets: sent.append(targets.position)
+    leg._publisher.publish = str
+    high, low = tick.feedback.measured, tick.feedback.measured + 0.4
+    leg.elapsed = 0.0
+    for measured, age in ((high, 0), (high, 16 * TICK), (low, 0)):
+        feedback = replace(tick.feedback, measured=measured, command=BodyCommand(
+            'rising', 'rise', 0.5))
+        leg.on_tick(state.time_ns, {
+            'canonical_state': (tick.x, tick.x_dot, tick.gait), 'reference': tick.r,
+            'posture_feedback': (state.time_ns - age, feedback)})
+        leg.elapsed = TICK * 1e-9
+    np.testing.assert_array_equal(sent, (high[:3], low[:3]))
 
 
 def test_a_posture_control_that_comes_back_tells_no_mode_before_it_knows_it(ros: Ros) -> None:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -105,6 +106,24 @@ def test_changing_its_mind_half_way_up() -> None:
     life.loop.request_mode('stand_up')
     life.go(2.5)
     assert life.modes == ['lying', 'rising', 'lowering', 'rising', 'standing'] and life.stands
+
+
+@pytest.mark.parametrize('begun', ['lying', 'standing'])
+def test_half_up_when_its_posture_control_is_restarted_it_lies_down_and_can_stand_up(
+        begun: str) -> None:
+    life = Life('lying')
+    rise_half_way(life)
+    modes, low = life.loop.body.modes, life.robot.description.belly_depth
+    assert life.states[-1].base_position_in_world[2] > 2.0 * low
+    forgotten = replace(modes.initial_state(), mode=begun)
+    life.loop.posture = replace(life.loop.posture, mode=modes.picked_up(
+        forgotten, life.states[-1]))
+    life.go(modes.movements.duration(('fold',)) + 0.1)
+    assert life.modes == ['lying', 'rising', 'lowering', 'lying']
+    assert life.states[-1].base_position_in_world[2] == pytest.approx(low, abs=5e-3)
+    life.loop.request_mode('stand_up')
+    life.go(modes.movements.duration(('rise',)) + 0.3)
+    assert life.stands
 
 
 def test_pushed_over_it_is_damped_until_it_is_told_to_recover() -> None:

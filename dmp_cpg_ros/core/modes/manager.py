@@ -40,6 +40,9 @@ ON_ITS_BACK = 0.5
 RISEN_HEIGHT = 0.8
 """Share of the standing height from which it has risen."""
 
+LAIN_SHARE = 0.05
+"""Share of the way from lying to standing up to which it lies."""
+
 RISING_PATIENCE = 6.0
 """Time after the end of rising until it must have risen, in √(l/g)."""
 
@@ -111,7 +114,8 @@ class ModeManager:
         """Derive the movements and their durations."""
         self._sense, self._scale = falls.BodySense(description, legs), body_scale(description)
         self.movements = Movements(description)
-        self._stance_height = description.stance_height
+        self._stance_height, low = description.stance_height, description.belly_depth
+        self._lain_height = low + LAIN_SHARE * (self._stance_height - low)
         self._detector = falls.FallDetector(parameters, description.stance_height)
         self.parameters = parameters
 
@@ -120,15 +124,23 @@ class ModeManager:
         return ModeState(0, self.parameters.start_mode, reason='as started')
 
     def picked_up(self, state: ModeState, measured: RobotState) -> ModeState:
-        """Mode of a robot that was to stand at the start, after a restart in the middle of things:
-        what it is found in.
+        """Mode of a robot after a restart in the middle of things, unless it was to be damped at
+        the start: what it is found in. One that is neither up nor down is lowered.
         """
         condition = self._sense.condition(measured)
-        if state.mode != 'standing' or condition.height >= RISEN_HEIGHT * self._stance_height and (
-                condition.tilt <= UPRIGHT_TILT):
+        if state.mode == 'damped':
             return state
-        mode = 'lying' if condition.tilt <= UPRIGHT_TILT else 'damped'
-        return replace(state, mode=mode, reason='found like that after a restart')
+        if condition.tilt > UPRIGHT_TILT:
+            found = 'damped'
+        elif condition.height >= RISEN_HEIGHT * self._stance_height:
+            found = 'standing'
+        elif condition.height > self._lain_height:
+            return enter(state, 'lowering', ('fold',), 'found half up after a restart')
+        else:
+            found = 'lying'
+        if found == state.mode:
+            return state
+        return replace(state, mode=found, reason='found like that after a restart')
 
     def command(self, state: ModeState) -> BodyCommand:
         """What the legs have to do at the tick of a state."""

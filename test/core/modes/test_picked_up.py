@@ -31,9 +31,13 @@ def test_the_mode_is_that_of_the_body(pose: str, tilt: float, mode: str) -> None
     assert found.mode.mode == mode
 
 
-def test_a_start_that_was_not_to_stand_is_left_as_it_is() -> None:
-    suite = load_suite(None, {'start_mode': 'lying'})
+@pytest.mark.parametrize(('pose', 'start', 'mode'), [
+    ('standing', 'lying', 'standing'), ('lying', 'lying', 'lying'),
+    ('standing', 'damped', 'damped')])
+def test_how_it_was_to_start_says_nothing_unless_it_was_to_be_damped(
+        pose: str, start: str, mode: str) -> None:
+    suite = load_suite(None, {'start_mode': start})
     description, p = load_description(suite.robot_file), suite.parameters
-    state = PerfectTrackingRobot(description, suite.tick_ns, 'standing').reset()
+    state = PerfectTrackingRobot(description, suite.tick_ns, pose).reset()
     control = BodyControl(description, p.posture, p.mode)
-    assert control.picked_up(control.initial_state(), state).mode.mode == 'lying'
+    assert control.picked_up(control.initial_state(), state).mode.mode == mode
