@@ -121,13 +121,6 @@ class InhibitionNode(SuiteNode):
         self._gate = self.certified.commands()
         self.serve('inhibit', self._take_request)
 
-    def activate(self) -> None:
-        """Tell people the state from the start; in lock-step the first tick does. What the others
-        know of a stop they keep until then.
-        """
-        if not self.lock_step:
-            self._publish()
-
     def on_parameters(self) -> None:
         """Take over what may change while walking."""
         self._build()
@@ -290,7 +283,9 @@ class InhibitionNode(SuiteNode):
         return Acting(gait.cadence_scale, (self._network, self._acting, self._x), gait.ends)
 
     def diagnostic_values(self) -> Mapping[str, Any]:
-        """State of the stop."""
+        """State of the stop, once it is known."""
+        if not self._joined:
+            return {}
         return {'inhibition': self._state.state, 'requested': self._state.in_force,
                 'pushed': self._state.push.acts, 'blocked': self._state.block.acts,
                 'command': self._gate.foreseen(self._state.time_ns)}

@@ -24,6 +24,7 @@ from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework.known_stop import BRIEF_NS, PATIENT_NS
 from dmp_cpg_ros.nodes.inhibition import HEARTBEAT_NS, InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
+from dmp_cpg_ros.nodes.messages.inhibition import read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
 from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES
 from dmp_cpg_ros.nodes.messages.values import header_ns
@@ -138,6 +139,25 @@ def test_a_restarted_node_keeps_a_stop_and_does_not_stop_a_gait(ros: Ros) -> Non
     node, _ = watching(ros)  # nobody knows: only the service starts
     assert node._state.requested and not node._state.automatic
     node.destroy_node()
+
+
+@pytest.mark.parametrize('lock_step', [False, True])
+def test_a_restarted_node_tells_nothing_of_the_stop_before_it_knows_it(
+        ros: Ros, lock_step: bool) -> None:
+    node, told = InhibitionNode(context=ros.context, parameter_overrides=[
+        Parameter('lock_step', value=lock_step)]), []
+    ros.nodes.append(node)
+    node.trigger_configure()
+    node._publisher.publish = told.append  # type: ignore[method-assign]
+    node.trigger_activate()
+    _, state, tick = walked(300)
+    tick_at(node, state, tick)
+    assert not node._joined and not told and not node.diagnostic_values()
+    node._others.hear(*KNOWN)
+    node._others.hear('kept_gains', *KNOWN[1:])
+    stamp = tick_at(node, state, tick, TICK)
+    assert read_state_word(told[0]) == node.diagnostic_values()['inhibition'] == 'walking'
+    assert header_ns(told[0]) == stamp
 
 
 def test_what_restarted_oscillators_do_not_know_does_not_end_a_stop(ros: Ros) -> None:
