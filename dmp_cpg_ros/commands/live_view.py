@@ -26,7 +26,7 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from dmp_cpg_ros.commands.ros_arguments import positive
-from dmp_cpg_ros.commands.suite_client import SuiteClient, connected, prepared
+from dmp_cpg_ros.commands.suite_client import SuiteClient, connected, prepared, status_of
 from dmp_cpg_ros.commands.view_commands import ViewCommands
 from dmp_cpg_ros.commands.view_server import Frames, ViewServer
 from dmp_cpg_ros.configuration import ROBOTS, find_config
@@ -39,7 +39,7 @@ from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
-from dmp_cpg_ros.nodes.framework.execution import schedule
+from dmp_cpg_ros.nodes.framework.execution import OK, schedule
 from dmp_cpg_ros.nodes.framework.own_messages import OwnMessages
 from dmp_cpg_ros.nodes.framework.parameters import BATCH, LockStepParameters, ParameterTable, plain
 from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader
@@ -53,9 +53,6 @@ from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.robot.scene import Scene
 from dmp_cpg_ros.suite import load_gaits
 from dmp_cpg_ros.suite_table import ROBOT
-
-OK, FAILED = 0, 1
-"""Exit statuses: ended by Ctrl-C; nobody there."""
 
 PERIOD_S = 1.0 / 30.0
 """Time between two frames [s]."""
@@ -267,8 +264,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         scene[0] = views[0].scene
         views[0].run(frames)
     except (DmpCpgError, OSError, RuntimeError) as error:
-        print(f'live_view: {error}', file=sys.stderr)
-        return FAILED
+        return status_of('live_view', error)
     except KeyboardInterrupt:
         return OK
     finally:

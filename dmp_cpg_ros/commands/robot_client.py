@@ -26,19 +26,21 @@ from dmp_cpg_ros.commands.suite_client import (
     connected,
     deliver,
     prepared,
+    status_of,
     velocity_command,
 )
 from dmp_cpg_ros.commands.teleop import AXES, HELD, drive, steer
 from dmp_cpg_ros.configuration import parse_yaml
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
+from dmp_cpg_ros.nodes.framework.execution import OK
 from dmp_cpg_ros.nodes.framework.parameters import plain
 from dmp_cpg_ros.nodes.messages.commands import push_force
 from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, TOPICS, interface
 from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
 
-OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-"""Exit statuses: done, refused or nobody there, bad input, Ctrl-C."""
+INTERRUPTED = 130
+"""Exit status after Ctrl-C."""
 
 ENDLESS = ('cmd_vel', 'teleop', 'joystick', 'echo')
 """Commands that Ctrl-C ends as it should."""
@@ -50,8 +52,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:  # the last command is zero and the terminal is as it was, whatever ends it
         options.run(connected('robot_client', words, options.wait), options)
     except (DmpCpgError, RuntimeError) as error:
-        print(f'robot_client: {error}', file=sys.stderr)
-        return BAD_INPUT if isinstance(error, ParameterError) else FAILED
+        return status_of('robot_client', error)
     except KeyboardInterrupt:
         return OK if options.command in ENDLESS else INTERRUPTED
     finally:

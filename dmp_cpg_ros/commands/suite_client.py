@@ -19,12 +19,17 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.task import Future
-from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.commands.ros_arguments import checked_namespace
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
-from dmp_cpg_ros.nodes.framework.execution import prepare_middleware, start_ros
+from dmp_cpg_ros.nodes.framework.execution import (
+    BAD_INPUT,
+    FAILED,
+    prepare_middleware,
+    start_ros,
+    without_ros_arguments,
+)
 from dmp_cpg_ros.nodes.messages.commands import twist
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, Interface, interface
 
@@ -155,12 +160,12 @@ def prepared(parser: argparse.ArgumentParser, arguments: Sequence[str] | None
     from now on SIGTERM ends as Ctrl-C does.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
-    options = parser.parse_args(remove_ros_args(words))
-    if options.namespace is not None:
-        try:
-            namespace = checked_namespace(options.namespace)
-        except ParameterError as error:
-            parser.error(str(error))
+    try:
+        options = parser.parse_args(without_ros_arguments(words))
+        namespace = None if options.namespace is None else checked_namespace(options.namespace)
+    except ParameterError as error:
+        parser.error(str(error))
+    if namespace is not None:
         words += ['--ros-args', '-r', f'__ns:={namespace or "/"}']
     prepare_middleware()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -181,6 +186,12 @@ def connected(name: str, words: Sequence[str], wait_s: float) -> SuiteClient:
     """Begin with ROS, as a node that looks for the suite so long [s]."""
     start_ros([name, *words])
     return SuiteClient(Node(name, enable_rosout=False, start_parameter_services=False), wait_s)
+
+
+def status_of(name: str, error: Exception) -> int:
+    """Say what ended a client; returns its exit status, 2 for bad input."""
+    print(f'{name}: {error}', file=sys.stderr)
+    return BAD_INPUT if isinstance(error, ParameterError) else FAILED
 
 
 @contextmanager

@@ -226,6 +226,8 @@ def test_what_is_not_finite_is_bad_input(suite: Processes) -> None:
     (robot_client.main, ['cmd_vel', 'fast'], "'fast' is no number"),
     (robot_client.main, ['--namespace', '9x y', 'nodes'], "'9x y' is no namespace"),
     (live_view.main, ['--namespace', '9x y'], "'9x y' is no namespace"),
+    (live_view.main, ['--ros-args', '-r', '__ns:=/9x'], "remap rule: '-r __ns:=/9x'"),
+    (robot_client.main, ['nodes', '--ros-args', 'fast'], "unknown arguments after --ros-args: ['"),
     (live_view.main, ['--port', '99999'], "'99999' is no port"),
     (live_view.main, ['--port', '-1'], "'-1' is no port"),
     (live_view.main, ['--wait', 'nan'], 'nan must be finite'),

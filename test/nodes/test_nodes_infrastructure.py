@@ -756,7 +756,8 @@ def test_bad_arguments_end_a_process_with_status_two(processes: Processes, tmp_p
 
 
 @pytest.mark.parametrize('command', [
-    ('reference_filter',), ('walk', '--no-report'), ('robot_client', 'nodes')])
+    ('reference_filter',), ('walk', '--no-report'), ('robot_client', 'nodes'),
+    ('live_view',)])
 @pytest.mark.parametrize(('variable', 'value', 'valid'), [
     ('ROS_DOMAIN_ID', 'mine', '0 to 232'),
     ('ROS_DOMAIN_ID', '233', '[0, 232]'),

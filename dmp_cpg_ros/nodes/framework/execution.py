@@ -116,6 +116,17 @@ def start_ros(arguments: Sequence[str], context: Context | None = None) -> None:
         raise ParameterError(f'ROS_DOMAIN_ID = {domain} must be in [0, {MOST_DOMAIN}]')
 
 
+def without_ros_arguments(arguments: Sequence[str]) -> list[str]:
+    """Arguments of a command line that are not for ROS; raises ParameterError for what ROS cannot
+    read.
+    """
+    with _cannot_start():
+        try:
+            return remove_ros_args(arguments)
+        except rclpy_implementation.UnknownROSArgsError as error:
+            raise ParameterError(f'unknown arguments after --ros-args: {error}') from error
+
+
 @contextlib.contextmanager
 def _cannot_start() -> Iterator[None]:
     """Raise ParameterError for what ROS refuses, in a line."""
@@ -170,8 +181,7 @@ since the signal for it [s]. Seldom, once in some thousand ends, a process waits
 OK, FAILED, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
 
-_BAD_ARGUMENTS = (ParameterError, MissingFileError, DataError, ParameterException,
-                  rclpy_implementation.UnknownROSArgsError)
+_BAD_ARGUMENTS = (ParameterError, MissingFileError, DataError, ParameterException)
 
 
 def make_executor(kind: str, context: Context | None = None) -> Executor:
@@ -292,8 +302,7 @@ def _end_within(seconds: float) -> None:
 
 def _run(program: str, arguments: Sequence[str], make: Callable[[], Iterable[SuiteNode]],
          nodes: list[SuiteNode], until: Future) -> None:
-    with _cannot_start():
-        unknown = remove_ros_args([program, *arguments])[1:]
+    unknown = without_ros_arguments(arguments)
     if unknown:
         raise ParameterError(
             f"unknown argument '{unknown[0]}'; valid are --help and --ros-args ...")
