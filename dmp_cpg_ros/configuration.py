@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import re
+import stat
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -65,7 +66,8 @@ def find_config(name: str | Path, folder: str = '') -> Path:
     Raises
     ------
     MissingFileError
-        If there is no such file; the text lists the folders searched and the names that exist.
+        If there is no such file; the text says what else bears the name, or lists the folders
+        searched and the names that exist.
     """
     if not isinstance(name, (str, Path)) or '\0' in str(name) or name in ('', Path()):
         raise MissingFileError(f'{shown(name)} is no name of a file')
@@ -74,10 +76,27 @@ def find_config(name: str | Path, folder: str = '') -> Path:
         return given.absolute()
     places = [] if given.is_absolute() else config_folders()
     meant = folder / given if given.parent == Path() else given
-    for candidate in (place / name for place in places for name in (meant, f'{meant}.yaml')):
+    candidates = [place / name for place in places for name in (meant, f'{meant}.yaml')]
+    for candidate in candidates:
         if os.path.isfile(candidate):
             return candidate
+    for candidate in (given, *candidates):
+        if kind := other_than_file(candidate):
+            raise MissingFileError(f'{str(candidate)!r} {kind}, not a file')
     raise MissingFileError(_not_found(name, meant, places))
+
+
+_KINDS = ((stat.S_ISDIR, 'a folder'), (stat.S_ISFIFO, 'a pipe'), (stat.S_ISSOCK, 'a socket'),
+          (stat.S_ISCHR, 'a device'), (stat.S_ISBLK, 'a device'))
+
+
+def other_than_file(path: str | Path) -> str:
+    """What a path is that is no file, such as ``is a folder``; empty where there is nothing."""
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return ''
+    return next((f'is {kind}' for holds, kind in _KINDS if holds(mode)), '')
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:

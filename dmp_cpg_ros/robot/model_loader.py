@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dmp_cpg_ros.configuration import other_than_file
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
 from dmp_cpg_ros.core.robot_model.grounds import Surface, World
 from dmp_cpg_ros.robot.mujoco_import import mujoco
@@ -64,7 +65,9 @@ def load_model(path: Path, base: str, world: World | None = None) -> mujoco.MjMo
         If MuJoCo cannot compile it.
     """
     if not path.is_file():
-        raise MissingFileError(f"model '{path}' does not exist")
+        kind = other_than_file(path)
+        raise MissingFileError(
+            f"model '{path}' {f'{kind}, not a file' if kind else 'does not exist'}")
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         if not any(geom.type in (_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)

@@ -14,7 +14,7 @@ from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dmp_cpg_ros.configuration import find_config, load_yaml, naming
+from dmp_cpg_ros.configuration import find_config, load_yaml, naming, other_than_file
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
 from dmp_cpg_ros.core.parameters import check_names, shown
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS
@@ -171,6 +171,9 @@ def find_model(name: str, folder: Path | None) -> Path:
     for place in places:
         if os.path.isfile(place):
             return place.resolve()
+    for place in places:
+        if kind := other_than_file(place):
+            raise MissingFileError(f'model {shown(name)}: {str(place)!r} {kind}, not a file')
     looked = ', '.join(repr(str(place)) for place in places)
     raise MissingFileError(f'model {shown(name)} was not found; looked at {looked}')
 

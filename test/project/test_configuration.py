@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -77,6 +78,19 @@ def test_an_empty_name_is_refused(name: str | Path) -> None:
 def test_a_missing_absolute_path_is_not_searched_elsewhere(tmp_path: Path) -> None:
     with pytest.raises(MissingFileError, match='does not exist$'):
         find_config(tmp_path / 'gaits.yaml')
+
+
+def test_what_is_no_file_is_called_what_it_is(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    os.mkfifo(tmp_path / 'queue')
+    (tmp_path / 'walks').mkdir()
+    (tmp_path / 'go2').mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert find_config('go2', ROBOTS).is_file()  # whatever lies in the working folder
+    for name, kind in (('walks', 'a folder'), (tmp_path / 'walks', 'a folder'),
+                       ('robots', 'a folder'), ('queue', 'a pipe'), ('/dev/null', 'a device')):
+        with pytest.raises(MissingFileError, match=f"{name}' is {kind}, not a file$"):
+            find_config(name)
 
 
 @pytest.mark.parametrize(('package', 'config', 'prefix_path'), [

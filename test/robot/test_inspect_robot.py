@@ -120,6 +120,8 @@ def test_a_robot_that_is_fixed_to_the_world_is_refused(tmp_path, capsys):
 
 @pytest.mark.parametrize(('arguments', 'text'), [
     (['no_such.xml'], "'no_such.xml' was not found"),
+    (['/dev/null'], "'/dev/null' is a device, not a file"),
+    ([str(ROBOTS)], 'is a folder, not a file'),
     ([str(ROBOTS / 'go2.yaml')], 'reads MJCF (.xml)'),
     ([str(own_robot_file().model), '--output', '/no_such_folder/robot.yaml'], 'cannot write'),
 ])
