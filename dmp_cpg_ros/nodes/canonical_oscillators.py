@@ -30,8 +30,9 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import CANONICAL, CertificateParameters
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
 from dmp_cpg_ros.nodes.framework.gait_memory import GaitMemory
-from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
+from dmp_cpg_ros.nodes.framework.gaits import check_gaits, description_of, gait_name
 from dmp_cpg_ros.nodes.framework.known_stop import KnownStop
+from dmp_cpg_ros.nodes.framework.parameters import Sets
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateWriter
 from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader
@@ -79,6 +80,15 @@ class CanonicalOscillators(SuiteNode):
                    delayed={'inhibition_gains': stamped(InhibitionGainsReader().read)},
                    optional=contacts)
         self._memory = GaitMemory(self, gaits)
+
+    def check_parameters(self, sets: Sets) -> None:
+        """Raise ParameterError to refuse a change; before the node is configured only that of a
+        gait which its file does not have.
+        """
+        asked = self.parameter_changes.between(sets).keys()
+        if not (self.configured or asked.isdisjoint(('gait', 'auto_gait', 'auto_gaits'))):
+            check_gaits(sets)
+        super().check_parameters(sets)
 
     def activate(self) -> None:
         """Tell late joiners what acts."""

@@ -155,3 +155,18 @@ def test_a_node_is_configured_with_what_was_accepted_last(ros: Ros) -> None:
     oscillators.trigger_cleanup()
     oscillators.start()
     assert oscillators.diagnostic_values()['gait'] == 'trot'
+
+
+@pytest.mark.parametrize('again', [False, True])
+def test_a_gait_that_there_is_not_is_refused_before_the_node_is_configured(
+        ros: Ros, again: bool) -> None:
+    oscillators = made(ros, CanonicalOscillators, auto_gaits=['walk', 'hop'])
+    if again:
+        oscillators.trigger_configure()
+        oscillators.trigger_cleanup()
+    for name, value, strange in (('gait', 'gallop', 'gallop'), ('auto_gait', True, 'hop')):
+        (result,) = oscillators.set_parameters([Parameter(name, value=value)])
+        assert not result.successful
+        assert f"no gait '{strange}'; valid are amble" in result.reason
+    assert oscillators.set_parameters([Parameter('gait', value='trot')])[0].successful
+    oscillators.start()

@@ -14,6 +14,7 @@ from dmp_cpg_ros.core.gait.running import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.suite_parameters import GaitParameters, RobotFileParameters
+from dmp_cpg_ros.nodes.framework.parameters import Sets
 from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader
 from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.robot.model_reader import load_description
@@ -37,6 +38,14 @@ def known_gaits(node: SuiteNode) -> KnownGaits:
     gaits = KnownGaits(load_gaits(node.parameters_of(GaitParameters).gaits_file))
     gaits.named(gait_name(node))
     return gaits
+
+
+def check_gaits(sets: Sets) -> None:
+    """Raise ParameterError for a gait that parameters choose and their file does not have."""
+    chosen, choice = sets[GaitParameters], sets[GaitChoiceParameters]
+    known = KnownGaits(load_gaits(chosen.gaits_file))
+    for name in (chosen.gait, *(choice.auto_gaits if choice.auto_gait else ())):
+        known.named(name)
 
 
 def gait_name(node: SuiteNode) -> str:
