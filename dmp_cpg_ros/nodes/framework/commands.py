@@ -14,7 +14,7 @@ from dmp_cpg_ros.nodes.messages.interfaces import Interface
 from dmp_cpg_ros.nodes.messages.values import counts_message
 
 if TYPE_CHECKING:
-    from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+    from dmp_cpg_ros.nodes.framework.connected_node import ConnectedNode
 
 
 class Commands:
@@ -22,11 +22,11 @@ class Commands:
 
     Parameters
     ----------
-    node : SuiteNode
+    node : ConnectedNode
         Who is commanded.
     """
 
-    def __init__(self, node: SuiteNode) -> None:
+    def __init__(self, node: ConnectedNode) -> None:
         """Know no topic yet."""
         self._node, self._taken = node, dict[str, int]()
         self._topics: list[tuple[Interface, Subscription]] = []

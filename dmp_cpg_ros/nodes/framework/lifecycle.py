@@ -107,9 +107,26 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
         """Tell what :attr:`health` knows."""
 
     @property
-    def waited_for(self) -> bool:
+    def lock_step(self) -> bool:
         """Whether the robot waits for this node at every tick, so that no work makes it late."""
         return False
+
+    # What is wrong ------------------------------------------------------------------------------
+
+    def warn(self, key: str, message: str, *, error: bool = False) -> None:
+        """Raise a warning that stays until :meth:`clear`; logged and reported when it is new."""
+        if self.health.set_problem(key, message, error=error):
+            # rclpy wants one severity for every line that logs.
+            if error:
+                self.get_logger().error(message)
+            else:
+                self.get_logger().warning(message)
+            self.report()
+
+    def clear(self, key: str) -> None:
+        """Withdraw a warning."""
+        if self.health.clear_problem(key):
+            self.report()
 
     # Transitions -------------------------------------------------------------------------------
 
@@ -263,7 +280,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
             left, then = self._changes
             now = time.monotonic()
             left = min(CHANGES, left + CHANGES_HZ * (now - then))
-            heard = (self.waited_for or left >= 1.0) and len(request.parameters) <= MOST_CHANGES
+            heard = (self.lock_step or left >= 1.0) and len(request.parameters) <= MOST_CHANGES
             self._changes = max(0.0, left - heard), now
             if heard:
                 return self.change(callback, request, response)

@@ -24,7 +24,7 @@ from dmp_cpg_ros.nodes.messages.interfaces import SHARED, Interface, expected_co
 from dmp_cpg_ros.suite_table import KINDS
 
 if TYPE_CHECKING:
-    from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+    from dmp_cpg_ros.nodes.framework.connected_node import ConnectedNode
 
 LOOK_EVERY_S = 0.2
 """How often the graph is asked for the publishers of a topic at most [s]."""
@@ -107,11 +107,11 @@ class TopicWriters:
 
     Parameters
     ----------
-    node : SuiteNode
+    node : ConnectedNode
         The node whose topics these are.
     """
 
-    def __init__(self, node: SuiteNode) -> None:
+    def __init__(self, node: ConnectedNode) -> None:
         """Know no topic yet."""
         self._node = node
         self._publishers = Publishers(node)
