@@ -112,7 +112,8 @@ def test_a_second_signal_does_not_break_into_the_end_of_a_recording(
         processes: Processes, tmp_path: Path, number: int) -> None:
     """Under launch a node gets the Ctrl-C of the terminal and that of launch."""
     program = (
-        'import os, sys\n'
+        'import os, signal, sys\n'
+        f'signal.signal({int(number)}, signal.SIG_DFL)\n'  # it may be ignored here
         'from dmp_cpg_ros.nodes.bag_recorder import BagRecorder\n'
         'from dmp_cpg_ros.nodes.framework.execution import run_node\n'
         'complete = BagRecorder.cleanup\n'

@@ -105,7 +105,7 @@ def test_relays_pass_on_what_the_nodes_of_a_tick_read() -> None:
         topic = interfaces.interface(name)
         for kind in topic.publishers:
             assert relays.messages_per_tick(known, kind)[0] >= 1.0
-        for kind in set(topic.subscribers) & set(RECORDED_WALK):
+        for kind in (set(topic.subscribers) - set(topic.sometimes)) & set(RECORDED_WALK):
             assert relays.reads(kind, topic)
     sent = sum(relays.messages_per_tick(known, kind)[0] for kind in RECORDED_WALK)
     taken = relays.messages_per_tick(known, RECORDED_WALK[-1])[1]
