@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,6 +42,8 @@ def test_the_process_of_a_node_is_found_beside_commands_that_are_no_text() -> No
     arguments = ([b'\xff'], [str(walk), 'fl', 'fr'], [str(walk), '__node:=inhibition'])
     processes = [subprocess.Popen([*sleep, *more]) for more in arguments]
     try:
+        while any(not Path(f'/proc/{process.pid}/cmdline').read_bytes() for process in processes):
+            pass  # the last one has just begun
         assert pid_of(walk, ['fl', 'fr']) == processes[1].pid
         assert pid_of(walk, ['inhibition']) == processes[2].pid
         assert pid_of(walk, ['fl', 'inhibition']) == 0
