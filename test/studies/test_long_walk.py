@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ros_processes import wait_until
 
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.studies.long_walk import MINUTE, events, growth, table
@@ -42,8 +43,8 @@ def test_the_process_of_a_node_is_found_beside_commands_that_are_no_text() -> No
     arguments = ([b'\xff'], [str(walk), 'fl', 'fr'], [str(walk), '__node:=inhibition'])
     processes = [subprocess.Popen([*sleep, *more]) for more in arguments]
     try:
-        while any(not Path(f'/proc/{process.pid}/cmdline').read_bytes() for process in processes):
-            pass  # the last one has just begun
+        wait_until(lambda: all(Path(f'/proc/{process.pid}/cmdline').read_bytes()
+                               for process in processes))  # the last one has just begun
         assert pid_of(walk, ['fl', 'fr']) == processes[1].pid
         assert pid_of(walk, ['inhibition']) == processes[2].pid
         assert pid_of(walk, ['fl', 'inhibition']) == 0
