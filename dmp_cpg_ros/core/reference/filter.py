@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, clamped
 from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.maths.vec3 import Triple, triple
 from dmp_cpg_ros.core.parameters import Parameters, parameter
@@ -115,9 +115,9 @@ class CommandGate:
     def _limit(self) -> None:
         """Bring the command within its range and the limits of the fastest gait."""
         p, gait, (v_x, v_y, gamma) = self.parameters, self._fastest, self.asked
-        self._limited = in_range = (min(max(v_x, -p.max_speed), p.max_speed),
-                                    min(max(v_y, -p.max_lateral_speed), p.max_lateral_speed),
-                                    min(max(gamma, -p.max_turn_rate), p.max_turn_rate))
+        self._limited = in_range = (clamped(v_x, -p.max_speed, p.max_speed),
+                                    clamped(v_y, -p.max_lateral_speed, p.max_lateral_speed),
+                                    clamped(gamma, -p.max_turn_rate, p.max_turn_rate))
         self._cut_by = '' if in_range == self.asked else 'range'
         if gait is not None and self._scale is not None:
             self._limited = gait.limited(in_range, self._scale, p.max_curve * gait.two_sided)
