@@ -38,7 +38,7 @@ from dmp_cpg_ros.studies import benchmark_grounds as grounds
 from dmp_cpg_ros.studies import benchmark_pushes, change_trials, late_walks, output, push_trials
 from dmp_cpg_ros.studies import walking_trials as trials
 from dmp_cpg_ros.studies.loop_recording import StopSummary, suite_of
-from dmp_cpg_ros.studies.study_stops import StopCase, run_trials
+from dmp_cpg_ros.studies.stop_trials import StopCase, run_trials
 from dmp_cpg_ros.studies.trial_tables import Table, by_cell, run, tell
 from dmp_cpg_ros.studies.walking_trials import is_there
 from dmp_cpg_ros.studies.workers import Workers

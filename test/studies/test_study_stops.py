@@ -19,8 +19,10 @@ from dmp_cpg_ros.analysis.recording import FootForceSeries, JointSeries, Odometr
 from dmp_cpg_ros.core.errors import DataError
 
 pytest.importorskip('mujoco')
-from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary, body_at_rest
-from dmp_cpg_ros.studies.study_stops import random_cases, run_cases, scenario_bound
+from dmp_cpg_ros.core.robot_model.grounds import Blocks, Slope
+from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary, body_at_rest, suite_of
+from dmp_cpg_ros.studies.random_stops import random_cases, scenario_bound
+from dmp_cpg_ros.studies.stop_trials import GROUNDS, StopCase, run_cases
 from dmp_cpg_ros.studies.workers import Workers
 
 ROBOT = quadruped()
@@ -89,6 +91,20 @@ def test_random_stops_depend_on_the_seed_only() -> None:
     assert cases == random_cases(options) and len(set(cases)) == 5
     assert cases[:3] == random_cases(Namespace(**{**vars(options), 'random': 3}))
     assert all(0.5 <= case.speed <= 1.5 and 0.3 <= case.friction <= 1.0 for case in cases)
+    many = random_cases(Namespace(**{**vars(options), 'random': 60}))
+    assert {case.ground for case in many} == set(GROUNDS)
+    assert len({case.seed for case in many}) == 60 and all(case.seed for case in many)
+
+
+def test_a_stop_is_tried_in_its_world_with_the_sensors_of_the_robot() -> None:
+    suite, case = suite_of(None), StopCase('trot', 0.5, 0.0, ground='blocks', roughness=0.03)
+    drawn = replace(case, seed=7).robot(suite)
+    assert drawn.world == Blocks(height=0.03, seed=7)
+    assert replace(case, ground='slope', roughness=-4.0).robot(suite).world == Slope(degrees=-4.0)
+    exact, *measured = (replace(case, seed=seed).robot(suite).reset().joint_position
+                        for seed in (0, 7, 7, 8))
+    assert (measured[0] == measured[1]).all() and (measured[0] != measured[2]).all()
+    assert (exact.reshape(4, 3) == exact[:3]).all() and (measured[0] != exact).all()
 
 
 def test_a_record_is_gone_on_with_and_changes_nothing(tmp_path: Path) -> None:
