@@ -96,32 +96,14 @@ def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _P
     scenario = load_scenario(named)
     if options.view and options.scenario is None:
         scenario = replace(scenario, duration_s=VIEWED_S)
-    overrides = {**scenario.parameters, **motion_overrides(options.motion or ''),
-                 **ros.parameters, **dict(map(ros_arguments.read_parameter, options.set))}
-    if options.robot is not None:
-        overrides['robot'] = str(find_config(options.robot, ROBOTS).resolve())
-    if options.rate is not None:
-        overrides['control_rate'] = options.rate
+    overrides = _overrides(scenario, options, ros)
     file = ros_arguments.given_file(options.parameters, ros, '--parameters')
     if scenario.parameters:
         load_suite(file, None, ros.namespace)  # what is wrong in it is not the scenario's
         with naming(find_config(named, SCENARIOS)):
             load_suite(file, scenario.parameters, ros.namespace)
     suite = load_suite(file, overrides, ros.namespace)
-    events = {event.kind for event in scenario.events}
-    for event in scenario.events:
-        changes = {'gait': event.value} if event.kind == 'gait' else (
-            event.value if event.kind == 'set' else {})
-        if 'gait' in changes:
-            with naming(f'{named}, event at {event.at:g} s'):
-                suite.gaits.named(changes['gait'])
-    if 'push' in events and suite.robot.physics != 'mujoco':
-        raise ParameterError(f'pushes need physics: mujoco, not {suite.robot.physics}')
-    if 'fail' in events and not suite.robot.failures_allowed:
-        raise ParameterError(f"scenario '{scenario.name}' lets components fail, which needs "
-                             'failures_allowed:=true')
-    if 'votes' in events and not suite.parameters.voting.voting:
-        raise ParameterError(f"scenario '{scenario.name}' votes, which needs voting:=true")
+    _check_events(scenario, suite, named)
     certificate = running(suite).certificate(whole=True)
     if not certificate.holds and not overrides.get('allow_uncertified', False):
         raise ParameterError(
@@ -136,6 +118,36 @@ def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _P
 
         film.checked_film_path(Path(options.video))
     return _Plan(scenario, suite, certificate, overrides, options, ros)
+
+
+def _overrides(scenario: Scenario, options: argparse.Namespace, ros: ros_arguments.RosArguments
+               ) -> dict[str, Any]:
+    """Parameters in place of the file's; those that are named later win."""
+    overrides = {**scenario.parameters, **motion_overrides(options.motion or ''),
+                 **ros.parameters, **dict(map(ros_arguments.read_parameter, options.set))}
+    if options.robot is not None:
+        overrides['robot'] = str(find_config(options.robot, ROBOTS).resolve())
+    if options.rate is not None:
+        overrides['control_rate'] = options.rate
+    return overrides
+
+
+def _check_events(scenario: Scenario, suite: Suite, named: str) -> None:
+    """Raise ParameterError for an event that the suite cannot have."""
+    for event in scenario.events:
+        gait = event.value if event.kind == 'gait' else (
+            event.value.get('gait') if event.kind == 'set' else None)
+        if gait is not None:
+            with naming(f'{named}, event at {event.at:g} s'):
+                suite.gaits.named(gait)
+    events = {event.kind for event in scenario.events}
+    if 'push' in events and suite.robot.physics != 'mujoco':
+        raise ParameterError(f'pushes need physics: mujoco, not {suite.robot.physics}')
+    if 'fail' in events and not suite.robot.failures_allowed:
+        raise ParameterError(f"scenario '{scenario.name}' lets components fail, which needs "
+                             'failures_allowed:=true')
+    if 'votes' in events and not suite.parameters.voting.voting:
+        raise ParameterError(f"scenario '{scenario.name}' votes, which needs voting:=true")
 
 
 def _walk(plan: _Plan, server: ForkServer) -> int:
