@@ -25,12 +25,20 @@ from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, 
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.balance.progress import feet_behind
-from dmp_cpg_ros.core.balance.terrain import LEVEL_FEET, NOTHING_FELT, ROLLING, SLOW, Terrain
+from dmp_cpg_ros.core.balance.terrain import (
+    LEVEL_FEET,
+    NOTHING_FELT,
+    QUIET,
+    ROLLING,
+    SLOW,
+    Terrain,
+    contacts,
+)
 from dmp_cpg_ros.core.balance.unfelt import as_planned
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
-from dmp_cpg_ros.core.gait.contact_feedback import LOADED, believed, quarter_weight
+from dmp_cpg_ros.core.gait.contact_feedback import believed, quarter_weight
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.blocked import Progress
 from dmp_cpg_ros.core.maths import Array, clamped, vec3
@@ -39,7 +47,7 @@ from dmp_cpg_ros.core.maths.vec3 import Matrix, Pair, Triple
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
-from dmp_cpg_ros.core.transformation.foot_path import activities_step
+from dmp_cpg_ros.core.transformation.foot_path import activities_step, resting
 from dmp_cpg_ros.core.transformation.leg import LegFeedback, body_scale, nominal_foothold
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
@@ -158,7 +166,7 @@ class PostureController:
             vec3.triple(foot) for foot in (footholds - description.com_in_base).tolist()]
         self._room = self.placement.room(parameters.reach)
         self.foot_radius = float(np.mean([leg.foot_radius for leg in description.legs]))
-        self._touch_force = LOADED * quarter_weight(description)
+        self._quarter_weight = quarter_weight(description)
         self._com_in_base = vec3.triple(description.com_in_base.tolist())
         self._torque_limit = [
             float(most) for leg in description.legs for most in leg.torque_limit]
@@ -246,10 +254,10 @@ class PostureController:
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(gait, positions, duty, omega, moving)
         acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
-        foot_force = believed(state.foot_force)
         terrain, level = self._ground(
-            memory.terrain, state, foot_force, R_ground_base[2], [foot for foot, _ in legs],
-            [position / (1.0 - duty) + 0.5 for position in positions], gait, (reference, measured)
+            memory.terrain, state, R_ground_base[2], [foot for foot, _ in legs],
+            [position / (1.0 - duty) + 0.5 for position in positions], gait, (reference, measured),
+            [resting(*of) for of in zip(swings, memory.activity.tolist(), strict=True)], dt
         ) if p.climbing else (NOTHING_FELT, LEVEL_FEET)
         return PostureState(activity, integral, plan, offset, terrain), PostureFeedback(
             self._torque(body, legs, feet, load, planned, bounce, acceleration),
@@ -258,7 +266,7 @@ class PostureController:
             np.array(self.placement.drift(
                 self.placement.yielding(p, reference[0], gait.firm), measured, planned, swings,
                 sway.velocity)),
-            np.array(correction), command, state.joint_position, foot_force,
+            np.array(correction), command, state.joint_position, believed(state.foot_force),
             self._margins(R_ground_base, feet, swings, (lean_x, lean_y), (
                 measured[0] - (planned[0] - lasting[0]),
                 measured[1] - (planned[1] - lasting[1]))),
@@ -266,9 +274,9 @@ class PostureController:
                 plan.expected, beside, feet, self._footholds, positions, duty, omega),
                 terrain.rough, terrain.gaps), felt or FELT, level)
 
-    def _ground(self, terrain: Terrain, state: RobotState, foot_force: Array,
-                normal_in_base: Triple, feet_in_base: Sequence[Triple], swung: Sequence[float],
-                gait: GaitInForce, velocities: Sequence[Triple]
+    def _ground(self, terrain: Terrain, state: RobotState, normal_in_base: Triple,
+                feet_in_base: Sequence[Triple], swung: Sequence[float], gait: GaitInForce,
+                velocities: Sequence[Triple], rests: Sequence[bool], dt: float
                 ) -> tuple[Terrain, tuple[float, ...]]:
         """Memory of the ground, and heights of the feet over the plane with a normal that the body
         follows [m]; a body tells a first step at low velocities (v_x, v_y [m/s], γ [rad/s]) of the
@@ -280,10 +288,12 @@ class PostureController:
         limit = SLOW * self.scale.speed(gait.highest(self.scale))
         calm = (gait.firm >= 1.0 and abs(vec3.dot(n, vec3.times(R_world_base, LEFT))) < ROLLING
                 and all(self.scale.foot_speed(*velocity) < limit for velocity in velocities))
+        touches, rests = contacts(state.foot_force, rests, self._quarter_weight)
+        quiet = self.scale.foot_speed(*velocities[1]) < self.scale.speed(QUIET)
         return terrain.felt(
             place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot in feet_in_base],
-            n, swung, [force > self._touch_force for force in foot_force.tolist()],
-            self.scale.leg_length, calm, all(end.steps == len(LEGS) for end in gait.ends))
+            n, swung, touches, self.scale.leg_length, calm,
+            all(end.steps == len(LEGS) for end in gait.ends), rests, quiet * dt)
 
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], swings: list[float],
                  under: Pair, error: Pair) -> tuple[float, ...]:

@@ -39,6 +39,10 @@ by more than ``HOLLOW`` l is in a gap. For the next ``FADES`` l the body does no
 its command because of it: it would fall over the leg that does not bear, and slow feet step into
 every gap. Only a body that may tell the first step finds a first gap, and only in a gait whose
 legs step one after the other: two legs of a trot bear too short for that.
+
+**At rest.** A leg that is held where the ground is lower than the plane through the others hangs,
+and stays so. A foot of a resting leg that touches nothing while ``STANDING`` others do goes down,
+by ``LOWEST`` l at most, until it touches, and stands there until it swings again.
 """
 
 from __future__ import annotations
@@ -47,6 +51,8 @@ from collections.abc import Sequence
 from math import dist, exp
 from typing import NamedTuple
 
+from dmp_cpg_ros.core.gait.contact_feedback import LOADED, UNLOADED, believed
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.vec3 import Triple, dot
 
 UNEVEN = 0.1
@@ -102,6 +108,20 @@ SEARCHED = 0.25
 leg; no further than it can reach.
 """
 
+QUIET = 0.05
+"""Speed of a body below which its feet may go down, as a share of √(g l): one that is pushed lifts
+feet that are to find the same ground again.
+"""
+
+SINKING = 0.3
+"""Speed at which a foot goes down then, in lengths of the leg per second."""
+
+STANDING = 2
+"""Feet on which a robot stands whose others hang; one that is held up has none."""
+
+LOWEST = 0.1
+"""How far a foot goes down that hangs at rest, in lengths of the leg."""
+
 LEVEL_FEET: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 """Heights of feet that stand in the plane [m]."""
 
@@ -119,12 +139,18 @@ class Terrain(NamedTuple):
         p_i, where each foot stood last [m]; empty before the first tick.
     place : tuple of float
         Of the body at the last tick, in the same frame [m].
+    lowered : tuple of four floats
+        How far feet went down that hung at rest, not above 0 [m].
+    walked : bool
+        Whether a foot has left the ground; before, all stand where the robot was put.
     """
 
     rough: float = 0.0
     gaps: float = 0.0
     footholds: tuple[Triple, ...] = ()
     place: Triple = (0.0, 0.0, 0.0)
+    lowered: tuple[float, ...] = LEVEL_FEET
+    walked: bool = False
 
     @property
     def followed(self) -> float:
@@ -133,7 +159,8 @@ class Terrain(NamedTuple):
 
     def felt(self, place: Triple, feet: Sequence[Triple], normal: Triple,
              swung: Sequence[float], touches: Sequence[bool], leg_length: float,
-             calm: bool = True, in_turn: bool = True) -> tuple[Terrain, tuple[float, ...]]:
+             calm: bool = True, in_turn: bool = True, rests: Sequence[bool] = (False,) * 4,
+             quiet_s: float = 0.0) -> tuple[Terrain, tuple[float, ...]]:
         """Advance by one tick.
 
         Parameters
@@ -155,12 +182,17 @@ class Terrain(NamedTuple):
             Whether the body may tell the first step.
         in_turn : bool
             Whether the legs step one after the other.
+        rests : sequence of four bool
+            Which legs rest on feet that tell what they touch.
+        quiet_s : float
+            Time of this tick in which feet may go down that then touch nothing [s].
 
         Returns
         -------
         terrain : Terrain
         level : tuple of four floats
-            Where the feet are to stand over the plane [m]; 0 while nothing is rough.
+            Where the feet are to stand over the plane [m]; 0 while nothing is rough and no foot
+            was lowered.
         """
         way = dist(place, self.place)
         anew = not self.footholds or way > JUMP * leg_length
@@ -189,10 +221,41 @@ class Terrain(NamedTuple):
             for foot, share, touch in zip(feet, swung, touches, strict=True))
         gaps = FADES * leg_length if hangs else 0.0 if anew else max(0.0, self.gaps - way)
         rough = min(rough, HIGHEST * leg_length) if rough > FORGOTTEN * leg_length else 0.0
-        return Terrain(rough, gaps, footholds, place), LEVEL_FEET if rough == 0.0 else tuple(
-            height - mean - RAISED * rough - (
-                SEARCHED * leg_length if share > 1.0 and not touch else 0.0)
-            for height, share, touch in zip(heights, swung, touches, strict=True))
+        walked = self.walked or any(
+            0.0 <= share <= 1.0 and not (touch or rest)
+            for share, touch, rest in zip(swung, touches, rests, strict=True))
+        sink = SINKING * leg_length * quiet_s * (walked and sum(touches) >= STANDING)
+        lowered = LEVEL_FEET if not any(rests) and self.lowered is LEVEL_FEET else tuple(
+            0.0 if 0.0 <= share <= 1.0 and not rest else
+            max(last - sink * (rest and not touch), -LOWEST * leg_length)
+            for last, rest, share, touch in zip(self.lowered, rests, swung, touches, strict=True))
+        terrain = Terrain(
+            rough, gaps, footholds, place, lowered if any(lowered) else LEVEL_FEET, walked)
+        return terrain, terrain.lowered if rough == 0.0 else tuple(
+            height - mean - RAISED * rough + down - (
+                SEARCHED * leg_length if share > 1.0 and not (touch or rest) else 0.0)
+            for height, down, rest, share, touch in zip(
+                heights, lowered, rests, swung, touches, strict=True))
+
+
+def contacts(told: Array, rests: Sequence[bool], quarter: float
+             ) -> tuple[list[bool], list[bool]]:
+    """Which feet touch something, and which legs rest on feet whose sensors tell that.
+
+    Parameters
+    ----------
+    told : ndarray (4,)
+        Normal forces as sensors tell them [N].
+    rests : sequence of four bool
+        Which legs rest; their feet touch with less than one that comes down.
+    quarter : float
+        A quarter of the robot's weight [N].
+    """
+    known = believed(told)
+    touches = [force > (UNLOADED if rest else LOADED) * quarter
+               for force, rest in zip(known.tolist(), rests, strict=True)]
+    return touches, [rest and same for rest, same in zip(
+        rests, (known == told).tolist(), strict=True)]
 
 
 NOTHING_FELT = Terrain()

@@ -143,6 +143,10 @@ def swing_height(s: float) -> tuple[float, float]:
     return u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u) * scale
 
 
+RESTING = 0.3
+"""Activity of a leg below which it rests unless it begins to move."""
+
+
 def activity_step(activity: float, phase_rate: float, omega: float, rate: float,
                   dt: float) -> float:
     """Advance ȧ = rate · (sat(φ̇/ω) − a) exactly for a held phase rate.
@@ -176,6 +180,13 @@ def activities_step(activities: Array, phase_rates: list[float], omegas: list[fl
         wanted = clamped(phase_rate / omega, 0.0, 1.0)
         after.append(wanted + (activity - wanted) * kept)
     return np.array(after)
+
+
+def resting(activity: float, before: float) -> bool:
+    """Whether a leg with an activity, and another one tick before, rests: on uneven ground it
+    stands then, wherever in its cycle it is held.
+    """
+    return activity < RESTING and activity <= before
 
 
 def rolling_share(kinematics: LegKinematics, foothold_in_base: Array) -> tuple[float, float]:

@@ -32,6 +32,7 @@ from dmp_cpg_ros.core.transformation.foot_path import (
     HermiteMotion,
     Motion,
     activity_step,
+    resting,
     rolling_share,
     swing_height,
 )
@@ -259,7 +260,8 @@ class LegPrimitive:
         if dt <= 0.0:
             return (0.0, 0.0, 0.0), state.stumble
         edge, (now, then) = 0.5 * (1.0 - path.duty), positions
-        stands, will_stand = abs(now) >= edge, abs(then) >= edge
+        stands, will_stand = abs(now) >= edge, abs(then) >= edge or (
+            feedback.level != 0.0 and resting(activity, state.activity))
         measured, target = self.kinematics.foot(feedback.joint_position), self.kinematics.foot(
             acting)
         away, offset = minus(measured, target), state.shift_in_base

@@ -20,9 +20,11 @@ from dmp_cpg_ros.core.balance.terrain import (
     HOLLOW,
     JUMP,
     LEVEL_FEET,
+    LOWEST,
     MARGIN,
     RAISED,
     SEARCHED,
+    SINKING,
     STEP,
     UNEVEN,
     Terrain,
@@ -41,10 +43,12 @@ heights = st.lists(st.floats(-0.5, 0.5), min_size=4, max_size=4)
 
 def felt(z: Sequence[float], terrain: Terrain = NOTHING, x: float = 0.0,
          swung: Sequence[float] = (STANDING,) * 4, touches: Sequence[bool] = (True,) * 4,
-         calm: bool = True, in_turn: bool = True) -> tuple[Terrain, tuple[float, ...]]:
+         calm: bool = True, in_turn: bool = True, rests: Sequence[bool] = (False,) * 4,
+         quiet_s: float = 0.0) -> tuple[Terrain, tuple[float, ...]]:
     feet: list[Triple] = [
         (x + a, b, up) for (a, b), up in zip(PLACES, z, strict=True)]
-    return terrain.felt((x, 0.0, 0.3), feet, UP, swung, touches, LENGTH, calm, in_turn)
+    return terrain.felt(
+        (x, 0.0, 0.3), feet, UP, swung, touches, LENGTH, calm, in_turn, rests, quiet_s)
 
 
 @given(heights)
@@ -179,3 +183,38 @@ def test_gaps_are_counted_on_for_a_way() -> None:
     assert past.gaps == 0.0
     anew, _ = felt((0.0,) * 4, on, x=0.1 + 2.0 * JUMP * LENGTH)
     assert anew.gaps == 0.0
+
+
+FLAT, RESTING, HANGS = (0.0,) * 4, (True,) * 4, (False, True, True, True)
+
+
+@pytest.mark.parametrize('swung', [STANDING, SWINGING, 1.2])
+@pytest.mark.parametrize('known', [NOTHING, KNOWN])
+def test_foot_that_hangs_at_rest_goes_down_until_it_stands(known: Terrain, swung: float) -> None:
+    known = felt(FLAT, known, swung=(SWINGING,) * 4, touches=HANGS)[0]   # it has walked
+    terrain, before = felt(FLAT, known, swung=(swung,) * 4, rests=RESTING)
+    for _ in range(5):
+        terrain, level = felt(FLAT, terrain, swung=(swung,) * 4, touches=HANGS, rests=RESTING,
+                              quiet_s=0.01)
+    found = 0.05 * SINKING * LENGTH
+    assert np.subtract(level, before) == pytest.approx((-found, 0.0, 0.0, 0.0))
+    stands = felt(FLAT, terrain, swung=(swung,) * 4, rests=RESTING, quiet_s=0.01)
+    assert stands[1] == pytest.approx(level)
+    assert felt(FLAT, stands[0], swung=(swung,) * 4)[0].lowered == (
+        LEVEL_FEET if swung == SWINGING else pytest.approx((-found, 0.0, 0.0, 0.0)))
+    for _ in range(9):
+        terrain, _ = felt(FLAT, terrain, touches=HANGS, rests=RESTING, quiet_s=1.0)
+    assert terrain.lowered == pytest.approx((-LOWEST * LENGTH, 0.0, 0.0, 0.0))
+    held_up = felt(FLAT, touches=(False,) * 3 + (True,), rests=RESTING, quiet_s=0.01)
+    assert held_up[1] is LEVEL_FEET
+
+
+@pytest.mark.parametrize(('rests', 'quiet_s'), [((False,) * 4, 0.01), (RESTING, 0.0)])
+def test_feet_of_legs_that_walk_and_of_bodies_that_sway_stay(
+        rests: tuple[bool, ...], quiet_s: float) -> None:
+    known = Terrain(walked=True)
+    assert felt(FLAT, known, touches=HANGS, rests=rests, quiet_s=quiet_s)[1] is LEVEL_FEET
+
+
+def test_robot_that_was_put_on_its_feet_and_has_not_walked_stays() -> None:
+    assert felt(FLAT, touches=HANGS, rests=RESTING, quiet_s=0.01)[1] is LEVEL_FEET
