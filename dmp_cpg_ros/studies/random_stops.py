@@ -12,13 +12,15 @@ from math import pi
 import numpy as np
 
 from dmp_cpg_ros.studies.loop_recording import StopOutcome
-from dmp_cpg_ros.studies.stop_trials import GROUNDS, StopCase
+from dmp_cpg_ros.studies.stop_trials import StopCase
 
 LARGEST_PUSH = 2.6
 """[N s]; 0.3 m/s of the package's robot."""
 
-ROUGHNESS = {'flat': (0.0, 0.0), 'slope': (-8.0, 8.0), 'blocks': (0.0, 0.04), 'hills': (0.0, 8.0)}
-"""How rough the grounds are, at least and at most [deg], [m]."""
+ROUGHNESS = {'flat': (0.0, 0.0), 'slope': (-6.0, 6.0), 'hills': (0.0, 5.0)}
+"""Grounds, and how rough they are at least and at most [deg]. On blocks a foot may stand on an
+edge, and slide off it a second after the body stood.
+"""
 
 
 def random_cases(options: argparse.Namespace) -> list[StopCase]:
@@ -34,7 +36,7 @@ def random_cases(options: argparse.Namespace) -> list[StopCase]:
             braking=options.braking[0], resumes=not options.no_resume,
             friction=float(rng.uniform(0.3, 1.0)), payload=float(rng.uniform(0.0, 0.3)),
             direction=float(rng.uniform(0.0, 2.0 * pi)), seed=int(rng.integers(1, 2 ** 31)))
-        ground = str(rng.choice(tuple(GROUNDS)))
+        ground = str(rng.choice(tuple(ROUGHNESS)))
         cases.append(replace(case, ground=ground,
                              roughness=float(rng.uniform(*ROUGHNESS[ground]))))
     return cases

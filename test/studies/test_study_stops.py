@@ -21,8 +21,8 @@ from dmp_cpg_ros.core.errors import DataError
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.core.robot_model.grounds import Blocks, Slope
 from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary, body_at_rest, suite_of
-from dmp_cpg_ros.studies.random_stops import random_cases, scenario_bound
-from dmp_cpg_ros.studies.stop_trials import GROUNDS, StopCase, run_cases
+from dmp_cpg_ros.studies.random_stops import ROUGHNESS, random_cases, scenario_bound
+from dmp_cpg_ros.studies.stop_trials import StopCase, run_cases
 from dmp_cpg_ros.studies.workers import Workers
 
 ROBOT = quadruped()
@@ -92,7 +92,7 @@ def test_random_stops_depend_on_the_seed_only() -> None:
     assert cases[:3] == random_cases(Namespace(**{**vars(options), 'random': 3}))
     assert all(0.5 <= case.speed <= 1.5 and 0.3 <= case.friction <= 1.0 for case in cases)
     many = random_cases(Namespace(**{**vars(options), 'random': 60}))
-    assert {case.ground for case in many} == set(GROUNDS)
+    assert {case.ground for case in many} == set(ROUGHNESS)
     assert len({case.seed for case in many}) == 60 and all(case.seed for case in many)
 
 
@@ -105,6 +105,18 @@ def test_a_stop_is_tried_in_its_world_with_the_sensors_of_the_robot() -> None:
                         for seed in (0, 7, 7, 8))
     assert (measured[0] == measured[1]).all() and (measured[0] != measured[2]).all()
     assert (exact.reshape(4, 3) == exact[:3]).all() and (measured[0] != exact).all()
+
+
+@pytest.mark.parametrize('case', [
+    StopCase('amble', 0.148, 0.614, push=1.79, direction=3.96, friction=0.63, ground='blocks',
+             roughness=0.038, seed=1579371119),
+    StopCase('amble', 0.817, 0.052, push=0.23, direction=5.45, friction=0.48, ground='slope',
+             roughness=7.6, seed=1464939176)])
+def test_no_foot_is_left_hanging_by_a_stop_on_uneven_ground(case: StopCase) -> None:
+    """Feet that searched for the ground at rest left it whenever they found it, for ever."""
+    case = replace(case, leg='auto', braking=4.0, resumes=False)
+    _, outcome = run_cases([case], None, Workers(1))[0]
+    assert outcome.standing and outcome.still_s < 1.0 and outcome.tilt < 0.15
 
 
 def test_a_record_is_gone_on_with_and_changes_nothing(tmp_path: Path) -> None:
