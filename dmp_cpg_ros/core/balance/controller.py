@@ -255,7 +255,7 @@ class PostureController:
         bounce = self._bounce(gait, positions, duty, omega, moving)
         acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
         terrain, level = self._ground(
-            memory.terrain, state, R_ground_base[2], [foot for foot, _ in legs],
+            memory.terrain, state, R_ground_base[2], legs,
             [position / (1.0 - duty) + 0.5 for position in positions], gait, (reference, measured),
             [resting(*of) for of in zip(swings, memory.activity.tolist(), strict=True)], dt
         ) if p.climbing else (NOTHING_FELT, LEVEL_FEET)
@@ -275,8 +275,8 @@ class PostureController:
                 terrain.rough, terrain.gaps), felt or FELT, level)
 
     def _ground(self, terrain: Terrain, state: RobotState, normal_in_base: Triple,
-                feet_in_base: Sequence[Triple], swung: Sequence[float], gait: GaitInForce,
-                velocities: Sequence[Triple], rests: Sequence[bool], dt: float
+                legs: Sequence[tuple[Triple, Matrix]], swung: Sequence[float],
+                gait: GaitInForce, velocities: Sequence[Triple], rests: Sequence[bool], dt: float
                 ) -> tuple[Terrain, tuple[float, ...]]:
         """Memory of the ground, and heights of the feet over the plane with a normal that the body
         follows [m]; a body tells a first step at low velocities (v_x, v_y [m/s], γ [rad/s]) of the
@@ -288,10 +288,10 @@ class PostureController:
         limit = SLOW * self.scale.speed(gait.highest(self.scale))
         calm = (gait.firm >= 1.0 and abs(vec3.dot(n, vec3.times(R_world_base, LEFT))) < ROLLING
                 and all(self.scale.foot_speed(*velocity) < limit for velocity in velocities))
-        touches, rests = contacts(state.foot_force, rests, self._quarter_weight)
+        touches, rests = contacts(state, rests, legs, self._quarter_weight)
         quiet = self.scale.foot_speed(*velocities[1]) < self.scale.speed(QUIET)
         return terrain.felt(
-            place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot in feet_in_base],
+            place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot, _ in legs],
             n, swung, touches, self.scale.leg_length, calm,
             all(end.steps == len(LEGS) for end in gait.ends), rests, quiet * dt)
 

@@ -52,8 +52,9 @@ from math import dist, exp
 from typing import NamedTuple
 
 from dmp_cpg_ros.core.gait.contact_feedback import LOADED, UNLOADED, believed
-from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.vec3 import Triple, dot
+from dmp_cpg_ros.core.maths import vec3
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, dot
+from dmp_cpg_ros.core.robot_model.state import RobotState
 
 UNEVEN = 0.1
 """Difference between the heights of footholds that even ground does not feign, in lengths of the
@@ -238,24 +239,40 @@ class Terrain(NamedTuple):
                 heights, lowered, rests, swung, touches, strict=True))
 
 
-def contacts(told: Array, rests: Sequence[bool], quarter: float
-             ) -> tuple[list[bool], list[bool]]:
-    """Which feet touch something, and which legs rest on feet whose sensors tell that.
+def contacts(state: RobotState, rests: Sequence[bool], legs: Sequence[tuple[Triple, Matrix]],
+             quarter: float) -> tuple[list[bool], list[bool]]:
+    """Which feet touch something as their sensors tell, and which legs rest without a doubt of it:
+    one whose joints press on the ground while its sensor tells nothing has a sensor that is dead.
 
     Parameters
     ----------
-    told : ndarray (4,)
-        Normal forces as sensors tell them [N].
+    state : RobotState
+        Measured.
     rests : sequence of four bool
         Which legs rest; their feet touch with less than one that comes down.
+    legs : sequence of (foot_in_base, jacobian_in_base)
+        Of the four legs.
     quarter : float
         A quarter of the robot's weight [N].
     """
-    known = believed(told)
+    told, efforts = state.foot_force.tolist(), state.joint_effort.tolist()
+    forces = believed(state.foot_force).tolist()
     touches = [force > (UNLOADED if rest else LOADED) * quarter
-               for force, rest in zip(known.tolist(), rests, strict=True)]
-    return touches, [rest and same for rest, same in zip(
-        rests, (known == told).tolist(), strict=True)]
+               for force, rest in zip(forces, rests, strict=True)]
+    return touches, [
+        rest and force == said and (touch or pressure(jacobian, efforts[3 * i:3 * i + 3])
+                                    < LOADED * quarter)
+        for i, (rest, force, said, touch, (_, jacobian)) in enumerate(
+            zip(rests, forces, told, touches, legs, strict=True))]
+
+
+def pressure(jacobian: Matrix, efforts: Sequence[float]) -> float:
+    """Force [N] downwards in the base by which joint torques [N m] press a foot: −f_z of the
+    statics f = J⁻ᵀ τ, that of the leg's own weight included.
+    """
+    x, y, z = zip(*jacobian, strict=True)
+    hip, thigh, knee = efforts
+    return -vec3.damped_solution((x, y, z), (hip, thigh, knee))[2]
 
 
 NOTHING_FELT = Terrain()

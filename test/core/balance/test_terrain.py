@@ -5,9 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from core_examples import quadruped, standing_state
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -28,8 +30,11 @@ from dmp_cpg_ros.core.balance.terrain import (
     STEP,
     UNEVEN,
     Terrain,
+    contacts,
+    pressure,
 )
 from dmp_cpg_ros.core.maths.vec3 import Triple
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 
 LENGTH = 0.28
 NOTHING = Terrain()
@@ -218,3 +223,22 @@ def test_feet_of_legs_that_walk_and_of_bodies_that_sway_stay(
 
 def test_robot_that_was_put_on_its_feet_and_has_not_walked_stays() -> None:
     assert felt(FLAT, touches=HANGS, rests=RESTING, quiet_s=0.01)[1] is LEVEL_FEET
+
+
+@pytest.mark.parametrize(('load', 'dead', 'rests'), [
+    (20.0, False, True), (20.0, True, False), (0.0, True, True), (0.0, False, True)])
+def test_foot_that_presses_on_the_ground_and_tells_nothing_does_not_hang(
+        load: float, dead: bool, rests: bool) -> None:
+    """The first foot bears a load, and its sensor tells it or is dead."""
+    robot = quadruped()
+    state = standing_state(robot)
+    legs = RobotLegs(robot).at(state.joint_position.tolist())
+    force, effort = np.full(4, 20.0), np.zeros(12)
+    force[0] = 0.0 if dead else load
+    effort[:3] = np.array(legs[0][1]).T @ (0.0, 0.0, -load)   # τ = Jᵀ f of what the foot presses
+    assert pressure(legs[0][1], effort[:3].tolist()) == pytest.approx(load)
+    state = replace(state, foot_force=force, joint_effort=effort)
+    assert contacts(state, RESTING, legs, 20.0) == (
+        [force[0] > 2.0, True, True, True], [rests, True, True, True])
+    broken = replace(state, foot_force=np.array((np.nan, 20.0, 20.0, 20.0)))
+    assert contacts(broken, RESTING, legs, 20.0)[1][0] is False
