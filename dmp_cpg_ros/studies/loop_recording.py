@@ -252,12 +252,19 @@ class StopOutcome:
         return abs(self.predicted_s - self.measured_s) / self.measured_s
 
     @property
+    def late(self) -> bool:
+        """Whether the body stood later than was said although no step began the stop anew."""
+        return not (self.fell or self.stepped or self.still_s <= self.within_s + 1e-9)
+
+    @property
+    def far(self) -> bool:
+        """Whether it stood farther on than was said, likewise."""
+        return not (self.fell or self.stepped or self.displacement_m <= self.within_m)
+
+    @property
     def broken(self) -> bool:
-        """Whether it did not become of the body what was said: it fell, or stood later or farther
-        on although no step began the stop anew.
-        """
-        return self.fell or not self.stepped and not (
-            self.still_s <= self.within_s + 1e-9 and self.displacement_m <= self.within_m)
+        """Whether it did not become of the body what was said."""
+        return self.fell or self.late or self.far
 
     @property
     def bounded(self) -> bool:

@@ -5,9 +5,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import pi
+from statistics import median
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +19,9 @@ from dmp_cpg_ros.studies.stop_trials import StopCase
 
 LARGEST_PUSH = 2.6
 """[N s]; 0.3 m/s of the package's robot."""
+
+DOUBTS = (0.05, 1e-6)
+"""Probabilities β that what is said of the next stop is wrong."""
 
 ROUGHNESS = {'flat': (0.0, 0.0), 'slope': (-6.0, 6.0), 'hills': (0.0, 5.0)}
 """Grounds, and how rough they are at least and at most [deg]. On blocks a foot may stand on an
@@ -42,16 +48,40 @@ def random_cases(options: argparse.Namespace) -> list[StopCase]:
     return cases
 
 
-def scenario_bound(outcomes: Sequence[StopOutcome]) -> str:
-    """What N independent stops say of the next one: with none that is not as was said, one is so
-    with a probability below ε unless something of probability (1 − ε)^N = β has happened.
+def summary(cases: Sequence[StopCase], outcomes: Sequence[StopOutcome], seed: int
+            ) -> dict[str, Any]:
+    """What became of independent stops, and what they say of the next one.
+
+    With none of N that is not as was said, one is so with a probability below ε unless something
+    of probability (1 − ε)^N = β has happened.
+
+    Returns
+    -------
+    dict
+        Numbers of stops, of those that fell, that were stepped out of, and that did not become
+        what was said, ``late`` and ``far`` among them; of all but those stepped out of ``still_s``
+        and ``within_s`` as median and largest; and ``below``, ε by β, without those that fail.
     """
-    count, broken, stepped = len(outcomes), *(
-        sum(getattr(outcome, name) for outcome in outcomes) for name in ('broken', 'stepped'))
-    of = f'{count} stops, {stepped} stepped out of; in {broken} the body did not stand as was said'
-    if broken:
-        return of
-    shares = (f'{1.0 - doubt ** (1.0 / count):.2g} at confidence 1 - {doubt:g}'
-              for doubt in (0.05, 1e-6))
-    return (f'{of}: it does not in another one drawn alike with a probability below '
-            f'{" and below ".join(shares)}')
+    claimed = [outcome for outcome in outcomes if not (outcome.stepped or outcome.fell)]
+    count, broken = len(outcomes), sum(outcome.broken for outcome in outcomes)
+    return {
+        'seed': seed, 'stops': count,
+        'grounds': dict(Counter(case.ground for case in cases)),
+        **{name: sum(getattr(outcome, name) for outcome in outcomes)
+           for name in ('fell', 'stepped', 'broken', 'late', 'far')},
+        **{name: [median(values), max(values)] for name, values in (
+            (name, [getattr(outcome, name) for outcome in claimed])
+            for name in ('still_s', 'within_s')) if values},
+        'below': {} if broken else {
+            f'{doubt:g}': 1.0 - doubt ** (1.0 / count) for doubt in DOUBTS}}
+
+
+def scenario_bound(of: Mapping[str, Any]) -> str:
+    """A summary in words."""
+    text = (f'{of["stops"]} stops, {of["stepped"]} stepped out of; in {of["broken"]} the body did '
+            'not stand as was said')
+    if of['broken']:
+        return text
+    shares = ' and below '.join(
+        f'{share:.2g} at confidence 1 - {doubt}' for doubt, share in of['below'].items())
+    return f'{text}: it does not in another one drawn alike with a probability below {shares}'

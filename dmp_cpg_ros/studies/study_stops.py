@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from itertools import groupby, product
 from math import pi
 from pathlib import Path
+from typing import Any
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.inhibition import AUTO
@@ -31,7 +32,7 @@ from dmp_cpg_ros.studies.output import (
     percent,
     write_results,
 )
-from dmp_cpg_ros.studies.random_stops import random_cases, scenario_bound
+from dmp_cpg_ros.studies.random_stops import random_cases, scenario_bound, summary
 from dmp_cpg_ros.studies.stop_trials import METHODS, Results, StopCase, run_cases
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_gait
@@ -45,7 +46,7 @@ COLUMNS = ('gait', 'm/s', 'leg', 'cadence', 'braking', 'stopped by', 'cases', 'f
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study and print its table; returns the exit status."""
-    parser = parser_of('study_stops', __doc__, 'every case and outcome')
+    parser = parser_of('study_stops', __doc__, 'every case and outcome, of --random what they say')
     parser.add_argument('file', nargs='?', help="parameter file; the package's own without")
     parser.add_argument('--phases', type=int, default=16, metavar='N',
                         help='request phases, evenly over a cycle (default: 16)')
@@ -85,12 +86,14 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
         options.workers, options.cluster, not options.quiet), options.record)
     print(f'{suite.file}: {len(cases)} stops; columns with two numbers are median / worst\n')
     print(table(results, by_case=not options.random))
+    told: Any = [vars(case) | vars(outcome) for case, outcome in results]
     if options.random:
-        print(f'\n{scenario_bound([outcome for _, outcome in results])}')
+        told = summary(cases, [outcome for _, outcome in results], options.seed)
+        print(f'\n{scenario_bound(told)}')
         print(*(f'not as was said: {case} {outcome}' for case, outcome in results
                 if outcome.broken), sep='\n')
     print(*(f'fell: {case}' for case, outcome in results if outcome.fell), sep='\n')
-    write_results(options.json, [vars(case) | vars(outcome) for case, outcome in results])
+    write_results(options.json, told)
     return int(any(outcome.fell for case, outcome in results if case.method == METHODS[0]))
 
 

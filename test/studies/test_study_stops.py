@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.errors import DataError
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.core.robot_model.grounds import Blocks, Slope
 from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary, body_at_rest, suite_of
-from dmp_cpg_ros.studies.random_stops import ROUGHNESS, random_cases, scenario_bound
+from dmp_cpg_ros.studies.random_stops import ROUGHNESS, random_cases, scenario_bound, summary
 from dmp_cpg_ros.studies.stop_trials import StopCase, run_cases
 from dmp_cpg_ros.studies.workers import Workers
 
@@ -69,11 +69,24 @@ def test_random_stops_say_of_the_next_one_what_is_wrong_as_rarely_as_is_said() -
     rng, wrong = np.random.default_rng(3), 0
     for failing in rng.uniform(0.0, 0.3, 500):  # the true probability that one is not as was said
         late = rng.random(30) < failing
-        told = scenario_bound([replace(AS_SAID, still_s=1.1) if bad else AS_SAID for bad in late])
+        told = scenario_bound(summary(
+            [], [replace(AS_SAID, still_s=1.1) if bad else AS_SAID for bad in late], 0))
         below = re.search(r'below ([0-9.]+) at confidence 1 - 0.05', told)
         assert bool(below) is not late.any()
         wrong += below is not None and failing > float(below[1])
     assert wrong <= 25                                 # 5 % of 500
+
+
+def test_a_summary_of_random_stops_counts_what_failed_and_claims_nothing_then() -> None:
+    late, far = replace(AS_SAID, still_s=1.1), replace(AS_SAID, displacement_m=0.3)
+    stepped = replace(late, stepped=True)
+    case = StopCase('trot', 0.5, 0.0)
+    of = summary([case] * 3, [AS_SAID, late, far, stepped, StopOutcome(fell=True)], 7)
+    assert [of[name] for name in ('stops', 'fell', 'stepped', 'broken', 'late', 'far')] == [
+        5, 1, 1, 3, 1, 1]
+    assert of['still_s'] == [0.9, 1.1] and of['below'] == {} and of['grounds'] == {'flat': 3}
+    held = summary([case], [AS_SAID, stepped], 7)['below']
+    assert held == pytest.approx({'0.05': 1.0 - 0.05 ** 0.5, '1e-06': 1.0 - 1e-3})
 
 
 @pytest.mark.parametrize(('changes', 'broken'), [

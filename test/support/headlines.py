@@ -115,6 +115,18 @@ def brisk_stops(rows: Sequence[dict[str, str]]) -> str:
             f'{"none" if over == "0" else over} exceeded')
 
 
+def body_stops(of: Any) -> str:
+    """Of ``study_stops --random``."""
+    told = 'none of the others stood' if not of['late'] + of['far'] else (
+        f'of the others {of["late"]} stood later and {of["far"]} farther on,')
+    below = f', in another one below {100.0 * of["below"]["1e-06"]:.2g} % at confidence ' \
+        '1 − 10⁻⁶' if of['below'] else ''
+    later = ' later or farther on' if told.endswith('stood') else ''
+    return (f'{of["stops"]:,} drawn at random, on the flat, slopes of 6° and hills of 5°, with '
+            f'friction of 0.3 to 1, payloads and pushes: {of["fell"] or "none"} fell, '
+            f'{of["stepped"]} were stepped out of, {told}{later} than was said{below}')
+
+
 def value_of(rows: Sequence[dict[str, str]], name: str) -> str:
     """The one value that a column has in all rows."""
     (value,) = {row[name] for row in rows}
@@ -150,6 +162,28 @@ def gaits(results: Any) -> str:
     return (f'{len(outcomes)} changes between {number} gaits: '
             f'{sum(one["fell"] for one in outcomes) or "no"} fall, largest phase error '
             f'{digits}·10{sign} rad')
+
+
+def any_command(results: Any) -> str:
+    """Of ``random_commands``."""
+    count, _, fell, stops, late, stepped, _ = commanded(results)
+    kept = 'as predicted and within their bounds' if not late else f'of which {late} were late'
+    return (f'{count} walks of 60 s under random commands, gaits and stops on seeds nothing was '
+            f'tuned on: {fell or "none"} fell, {stops:,} stops {kept}, {stepped} more stepped '
+            'out of; without governor and caution, on other seeds, 8 of 12 walks fell')
+
+
+def commanded(results: Any) -> tuple[int, ...]:
+    """Walks, their time [s], falls, stops to rest, those of them that were late, stops that the
+    robot stepped out of, and the share of what was asked that was granted [%].
+    """
+    stops = [stop for one in results for stop in one['stops']]
+    late = [gait for gait, predicted, bound, took in stops
+            if took > bound + 1e-9 or abs(took - predicted) > 1e-9]
+    share = sum(one['granted'] for one in results) / sum(one['asked'] for one in results)
+    return (len(results), round(sum(one['seconds'] for one in results)),
+            sum(bool(one['fell']) for one in results), len(stops), len(late),
+            sum(one['stepped'] for one in results), round(100.0 * share))
 
 
 def rough(results: Any) -> str:
@@ -253,6 +287,13 @@ def brisk_rows(rows: Sequence[dict[str, str]]) -> list[str]:
             for row in rows[:-1]]
 
 
+def body_rows(of: Any) -> list[str]:
+    """Row of the table of random stops."""
+    still, within = of['still_s'], of['within_s']
+    return [f'| {of["seed"]} | {of["stops"]} | {of["fell"]} | {of["stepped"]} | {of["late"]} | '
+            f'{of["far"]} | {still[0]:.2f} / {still[1]:.2f} | {within[0]:.2f} |']
+
+
 def speed_rows(results: Any) -> list[str]:
     """Rows of the table of speeds: straight ahead, gait by gait."""
     rows = []
@@ -266,6 +307,14 @@ def speed_rows(results: Any) -> list[str]:
             f'at most {max(abs(one["outcome"]["yaw_drift"]) for one in ahead):.1f}°',
             f'{min(costs):.2f} to {max(costs):.2f} |')))
     return rows
+
+
+def command_rows(results: Any) -> list[str]:
+    """Row of the table of random commands."""
+    count, seconds, fell, stops, late, stepped, granted = commanded(results)
+    first, last = (of(one['seed'] for one in results) for of in (min, max))
+    return [f'(`--runs {count} --seed {first}`) | {first} to {last}, nothing tuned on | {count} | '
+            f'{seconds} | {fell} | {stops}, and {stepped} stepped out | {late} | {granted} % |']
 
 
 def rough_rows(results: Any) -> list[str]:
@@ -344,10 +393,12 @@ STUDIES = {
     'the-experiment': Study(experiment, experiment_rows),
     'speeds': Study(speeds, speed_rows), 'changes-of-gait': Study(gaits, gait_rows),
     'rough-ground': Study(rough, rough_rows),
+    'any-command': Study(any_command, command_rows, 'doc/walking.md'),
     'stairs-what-one-foot-felt-all-know': Study(stairs, stair_rows, 'doc/walking.md'),
     'tightness-of-the-certificates': Study(tightness, tightness_rows),
     'falls': Study(falls, fall_rows), 'stops-at-every-phase': Study(stops, stop_rows),
-    'brisk-stops': Study(brisk_stops, brisk_rows, 'doc/walking.md')}
+    'brisk-stops': Study(brisk_stops, brisk_rows, 'doc/walking.md'),
+    'when-the-body-stands': Study(body_stops, body_rows, 'doc/walking.md')}
 """Studies that have a file, ``doc/results/ANCHOR.json``, by the anchor of their section; that of
 the experiment is a run's ``metrics.json``, and that of stops is :data:`STOPS`.
 """

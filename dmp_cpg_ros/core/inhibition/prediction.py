@@ -4,9 +4,9 @@
 
 Oscillators and reference form a closed hierarchy, into which nothing of a stopping body enters:
 the same code that drives the legs predicts to the tick. The body is not part of it. Its times are
-those of the feet, which are, and of how long it then takes to calm down, which trials say: on flat
-ground with friction of 0.3 to 1, a payload of up to 30 % and a push of up to 0.3 m/s in the
-instant of the request (``study_stops --random``, doc/walking.md).
+those of the feet, which are, and of how long it then takes to calm down, which trials say: on the
+flat, slopes and hills with friction of 0.3 to 1, a payload of up to 30 % and a push of up to
+0.3 m/s in the instant of the request (``study_stops --random``, doc/walking.md).
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ def test_forward_kinematics_from_the_description_agrees_with_the_model(file):
 
 def test_a_robot_file_is_short_and_its_robot_makes_sense(file):
     description = read(file)
-    assert 5.0 < description.mass < 100.0
+    assert 5.0 < description.mass < 150.0
     reach = np.mean([np.linalg.norm(leg.thigh) + np.linalg.norm(leg.shank)
                      for leg in description.legs])
     assert 0.5 * reach < description.stance_height < reach
