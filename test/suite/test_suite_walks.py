@@ -54,10 +54,11 @@ events:
 
 ON_BLOCKS = """\
 name: blocks
-duration: 2.0
+duration: 3.8
 events:
   - {at: 0.1, inhibit: false}
   - {at: 0.1, command: {v_x: 0.5}}
+  - {at: 2.4, inhibit: true}
 """
 
 PUSHED = """\
@@ -202,13 +203,14 @@ def test_contacts_reach_the_nodes_at_the_tick_at_which_they_are_measured(
 ) -> None:
     scenario = tmp_path / 'blocks.yaml'
     scenario.write_text(ON_BLOCKS, encoding='utf-8')
-    world = {'world': 'blocks', 'world_height': 0.03, 'control_rate': SHARED_HZ}
+    world = {'world': 'blocks', 'world_height': 0.03, 'world_seed': 4, 'control_rate': SHARED_HZ}
     values = {**world, **WITH_CONTACTS}
     options = [f'{name}:={str(value).lower()}' for name, value in values.items()]
     run = processes.walked(
         scenario, tmp_path / 'run', '--lock-step', '--processes', 'blocks',
         *(word for option in options for word in ('--set', option)))
     recording, (_, ticks) = load_recording(run / 'bag'), plain_run(scenario, **values)
+    assert min(ticks[-1].feedback.level) < 0.0             # a foot hung at rest and went down
     np.testing.assert_array_equal(recording.canonical.x_dot, [tick.x_dot for tick in ticks])
     np.testing.assert_array_equal(
         recording.targets.position, [tick.targets.position for tick in ticks]
