@@ -32,7 +32,7 @@ CALMING, LONGEST_CALMING = 0.31, 0.8
 trial exceeded [s].
 """
 
-FARTHER = 0.1, 0.15
+FARTHER = 0.1, 0.25
 """What the body goes farther than its reference in no trial: so far [m], and so far for every
 metre per second at the request [s].
 """
