@@ -122,7 +122,7 @@ def body_stops(of: Any) -> str:
     below = f', in another one below {100.0 * of["below"]["1e-06"]:.2g} % at confidence ' \
         '1 − 10⁻⁶' if of['below'] else ''
     later = ' later or farther on' if told.endswith('stood') else ''
-    return (f'{of["stops"]:,} drawn at random, on the flat, slopes of 6° and hills of 5°, with '
+    return (f'{of["stops"]:,} random stops on the flat, slopes of 6° and hills of 5°, with '
             f'friction of 0.3 to 1, payloads and pushes: {of["fell"] or "none"} fell, '
             f'{of["stepped"]} were stepped out of, {told}{later} than was said{below}')
 
