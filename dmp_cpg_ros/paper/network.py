@@ -137,7 +137,7 @@ class MeanFieldCoupling:
 
     def __call__(self, x: Array) -> Array:
         """Rates, ndarray (N, 2) → (N, 2)."""
-        z = np.ascontiguousarray(x).view(complex)[:, 0]
+        z = np.ascontiguousarray(x, dtype=float).view(complex)[:, 0]
         rate = (self._gain * np.vdot(self._turn, z)) * self._turn - self.bound * z
         return rate.view(float).reshape(x.shape)
 

@@ -97,6 +97,8 @@ def test_the_mean_field_is_the_sum_over_all_edges(seed: int, size: int, gain: fl
     phases, x = rng.uniform(-3.0, 3.0, size), rng.normal(size=(size, 2))
     graph = graph_from_edges(size, topology('all_to_all', size), gain, phases)
     assert np.allclose(MeanFieldCoupling(size, gain, phases)(x), EdgeCoupling(graph)(x))
+    whole = np.round(4.0 * x).astype(int)
+    assert np.allclose(MeanFieldCoupling(size, gain, phases)(whole), EdgeCoupling(graph)(whole))
 
 
 def run(of: OscillatorNetwork, x: np.ndarray, seconds: float, dt: float = 0.004,

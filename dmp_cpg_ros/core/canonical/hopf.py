@@ -91,7 +91,7 @@ class AndronovHopf:
             turning = np.asarray(omega)[..., None] * (x @ phase_generator().T)
             return np.asarray(turning + (at_origin - damping)[..., None] * x)
         growth = np.asarray(at_origin - 1j * omega - damping)
-        return (growth[..., None] * np.ascontiguousarray(x).view(complex)).view(float)
+        return (growth[..., None] * np.ascontiguousarray(x, dtype=float).view(complex)).view(float)
 
     def jacobian(self, x: Array, omega: float | Array) -> Array:
         """Jacobian A = ∂f/∂x = ω S + ρ (r² − |x|²) I − 2ρ x xᵀ.

@@ -110,6 +110,13 @@ def test_fields_of_many_states_are_those_of_each() -> None:
         assert np.allclose(oscillator.jacobian(x, omega)[i], oscillator.jacobian(x[i], omega[i]))
 
 
+@pytest.mark.parametrize('kind', [np.int64, np.float32])
+def test_states_of_another_type_of_number_have_the_same_field(kind: type) -> None:
+    oscillator, x = AndronovHopf(3.0), np.array([[2, 0], [0, -1], [1, 3]])
+    found = oscillator.field(x.astype(kind), 5.0)
+    assert np.array_equal(found, oscillator.field(x.astype(float), 5.0))
+
+
 @pytest.mark.parametrize('values', [(0.0, 1.0), (1.0, -1.0), (np.nan, 1.0), (1.0, np.inf)])
 def test_impossible_oscillators_are_refused(values: tuple[float, float]) -> None:
     with pytest.raises(ParameterError, match='positive finite'):
