@@ -63,6 +63,25 @@ def test_the_metric_does_what_the_theorem_says(name: str) -> None:
         assert np.linalg.norm(Fs @ along) < 2e-3 * scale * np.linalg.norm(along)
 
 
+def relaxing(x: np.ndarray) -> np.ndarray:
+    return np.array([x[1], -x[0] + 5.0 * (1.0 - x[0] ** 2) * x[1]])
+
+
+def fitzhugh_nagumo(x: np.ndarray) -> np.ndarray:
+    return np.array([x[0] - x[0] ** 3 / 3.0 - x[1] + 0.5, 0.08 * (x[0] + 0.7 - 0.8 * x[1])])
+
+
+@pytest.mark.parametrize('field', [relaxing, fitzhugh_nagumo])
+def test_a_decay_that_rounding_hides_beside_the_flow_is_known_by_liouville(field) -> None:
+    def jacobian(x: np.ndarray) -> np.ndarray:
+        return numerical_jacobian(field, x)
+
+    orbit = find_orbit(field, [2.0, 0.0], 100.0, 0.02)
+    rate = -np.mean([np.trace(jacobian(x)) for x in orbit.states])
+    assert rate * orbit.period > 30.0
+    assert floquet_rate(jacobian, orbit) == pytest.approx(rate, rel=1e-5)
+
+
 def test_the_floquet_rate_of_the_hopf_oscillator_is_known() -> None:
     orbit = find_orbit(hopf, np.array([1.0, 0.0]), 8.0, 0.005)
     assert orbit.period == pytest.approx(2.0 * np.pi / 7.0, rel=1e-6)
