@@ -18,6 +18,9 @@ WANDERING = 0.03
 correlated from sample to sample.
 """
 
+_BENDING = 4.0
+"""How many times less a multiple of a period must leave to be no bend of it."""
+
 _HARMONICS = 8
 _COARSE_SAMPLES = 500
 
@@ -29,7 +32,7 @@ def find_period(demonstration: Demonstration, shortest: float | None = None,
     Peaks of the summed Lomb-Scargle periodogram and their subharmonics are candidates. Each is
     refined by the least-squares fit of a Fourier series, which needs neither a whole number of
     cycles nor even sampling. Of the periods that fit about as well as the best, the shortest is
-    taken: multiples of a period fit as well as it does.
+    taken: multiples of a period fit as well as it does, and better where its frequency wanders.
 
     Parameters
     ----------
@@ -68,15 +71,19 @@ def find_period(demonstration: Demonstration, shortest: float | None = None,
     coarse = [some.best_nearby(f, 0.6 / span, low, high)
               for f in _candidates(times, values, low, high)]
     least, reach = min(error for _, error in coarse), 0.06 / span
-    refined = [whole.refined(f, reach) for f, error in coarse if error < 3.0 * least + 0.01]
-    least = min(error for _, error in refined)
-    frequency = max(f for f, error in refined if error <= 1.1 * least + 1e-6)
+    refined = [whole.refined(f, reach)
+               for f, error in coarse if error < _BENDING * least + 0.01]
+    left, best = min((error, f) for f, error in refined)
+    # What a period leaves is noise, or a frequency that wanders: its multiples bend to that.
+    spare = 1.1 if whole.residual_correlation(best) <= 0.5 else _BENDING
+    shortest = max(f for f, error in refined if error <= spare * left + 1e-6)
+    left, frequency = min((error, f) for f, error in refined if f > 0.9 * shortest)
     longer = frequency < low - 0.98 * reach  # no minimum: longer periods would fit even better
-    wanders = least > WANDERING and whole.residual_correlation(frequency) > 0.5
-    if longer or least > 0.5 or wanders:
+    wanders = left > WANDERING and whole.residual_correlation(frequency) > 0.5
+    if longer or left > 0.5 or wanders:
         raise DataError(
             f'no period between {1.0 / high:g} s and {1.0 / low:g} s explains the movement; the '
-            f'best, {1.0 / frequency:.4g} s, leaves {100.0 * least:.0f} % of the variance. Valid '
+            f'best, {1.0 / frequency:.4g} s, leaves {100.0 * left:.0f} % of the variance. Valid '
             'are at least 1.5 cycles of one frequency: take a steadier or longer part, or give '
             'the period')
     return float(1.0 / frequency)

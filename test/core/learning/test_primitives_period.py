@@ -84,6 +84,23 @@ def test_a_wandering_frequency_is_refused_and_no_multiple_of_the_period_is_made_
         find_period(recording)
 
 
+@pytest.mark.parametrize('wandering', [0.005, 0.01, 0.02])
+@pytest.mark.parametrize('modulation', [0.05, 0.13, 0.3])
+def test_a_period_that_wanders_a_little_is_no_multiple_of_it(wandering, modulation):
+    times = np.linspace(0.0, 10.0, 2001)
+    turns = times + wandering * np.sin(2.0 * np.pi * modulation * times) / (
+        2.0 * np.pi * modulation)
+    found = find_period(Demonstration(times, np.sin(2.0 * np.pi * turns)))
+    assert found == pytest.approx(1.0, rel=wandering)
+
+
+def test_a_weak_fundamental_that_wanders_a_little_is_no_half_of_it():
+    times = np.linspace(0.0, 10.0, 2001)
+    turns = times + 0.003 * np.sin(2.0 * np.pi * 0.13 * times)
+    found = find_period(Demonstration(times, SHAPES['weak fundamental'](2.0 * np.pi * turns)))
+    assert found == pytest.approx(1.0, rel=0.003)
+
+
 @pytest.mark.parametrize('part', [0.3, 0.5, 0.7, 1.0])
 @pytest.mark.parametrize('shape', ['sine', 'pulses'])
 def test_less_than_a_cycle_and_a_half_is_refused(part, shape):
