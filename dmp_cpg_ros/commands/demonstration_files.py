@@ -88,6 +88,9 @@ def _read(path: Path, joints: Sequence[str], topic: str, start: float | None, en
                             f'numbers up to {LARGEST_VALUE:g}')
     since = whole.times - whole.times[0]
     rows = (since >= (start or 0.0)) & (since <= (np.inf if end is None else end))
+    if not np.any(rows):
+        raise DataError(f'no sample is between {start or 0.0:g} s and '
+                        f'{since[-1] if end is None else end:g} s; it lasts {since[-1]:g} s')
     parts: dict[str, Any] = {field: values[rows][:, columns] for field in _ARRAYS
                              if (values := getattr(whole, field)) is not None}
     return replace(whole, times=whole.times[rows], names=names, **parts)

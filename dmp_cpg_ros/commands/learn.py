@@ -43,8 +43,16 @@ examples:
 """
 
 
+_NOT_OF_A_WALK = ('out', 'kind', 'period', 'joints', 'start', 'end', 'positions_only', 'method',
+                  'ridge', 'overlap', 'form')
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
+    return run_command(_parser(), arguments, _main)
+
+
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='learn', epilog=_EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
         description='Learn a discrete or rhythmic movement primitive from demonstrations.')
@@ -75,11 +83,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add('--stiffness', metavar='K', type=float, help='[1/s^2] (default: suits the duration)')
     add('--damping', metavar='B', type=float, help='[1/s] (default: critical)')
     add('--form', choices=FORMS, default=FORMS[0], help='reading of tau (default: scaled)')
-    return run_command(parser, arguments, _main)
+    return parser
 
 
 def _main(options: argparse.Namespace, _: RosArguments) -> int:
     if options.motion is not None:
+        usual = _parser()
+        given = [name for name in _NOT_OF_A_WALK
+                 if getattr(options, name) != usual.get_default(name)]
+        if given or options.bases == 'auto':
+            words = [*('--' + name.replace('_', '-') for name in given),
+                     *(['--bases auto'] if options.bases == 'auto' else [])]
+            raise ParameterError(f'--motion does not go with {", ".join(words)}: it takes all '
+                                 'feet, from what is steady walking, with so many bases')
         return _motion(options)
     if options.out is None:
         raise ParameterError('name the file to write, with --out FILE or --motion FILE')
@@ -120,14 +136,13 @@ def _motion(options: argparse.Namespace) -> int:
     heights = {robot.stance_height for _, robot in read}
     if len(heights) > 1:
         raise DataError('a motion is learned from walks of one robot')
-    bases = 25 if options.bases == 'auto' else options.bases
     gains = {name: value for name in ('stiffness', 'damping')
              if (value := getattr(options, name)) is not None}
-    primitive, errors = learn_motion(feet, heights.pop(), bases, **gains)
+    primitive, errors = learn_motion(feet, heights.pop(), options.bases, **gains)
     motion = LearnedMotion(primitive)
     save_primitive(primitive, options.motion)
     stride, side, lift = errors.reshape(-1, 3).max(axis=0)
-    print(f'motion of {len(feet)} feet, {bases} bases, from {len(feet[0])} stretch(es) of '
+    print(f'motion of {len(feet)} feet, {options.bases} bases, from {len(feet[0])} stretch(es) of '
           f'steady walking; lift {motion.clearance:.3g} of the standing height')
     print(f'left unexplained (root mean square): stride {100.0 * stride:.2g} % of a stride, '
           f'side {100.0 * side:.2g} % and lift {100.0 * lift:.2g} % of the standing height')

@@ -132,6 +132,13 @@ def test_a_part_of_a_recording_is_cut_out(tmp_path):
     np.testing.assert_array_equal(read.positions, WALK.positions[inside])
 
 
+def test_a_part_without_samples_is_named_with_what_there_is(tmp_path):
+    table = write_csv(tmp_path / 'a.csv', WALK)
+    for part in ({'start': 0.7, 'end': 0.2}, {'start': 100.0}):
+        with pytest.raises(DataError, match=f'it lasts {WALK.duration:g} s'):
+            read_demonstration(table, **part)
+
+
 def test_a_table_without_a_header_is_numbered(tmp_path):
     np.savetxt(
         tmp_path / 'a.csv', np.hstack([REACH.times[:, None], REACH.positions]), delimiter=','
@@ -289,6 +296,11 @@ def test_a_motion_needs_the_recording_of_a_walk(tmp_path, capsys):
     ):
         assert main([*given, '--motion', str(out)]) == BAD_INPUT
         assert text in capsys.readouterr().err
+    for asked, named in ((['--out', 'a.yaml', '--start', '1'], '--out, --start:'),
+                         (['--bases', 'auto'], '--bases auto'), (['--positions-only'], '-only')):
+        assert main([str(bag), '--motion', str(out), *asked]) == BAD_INPUT
+        told = capsys.readouterr().err
+        assert 'does not go with' in told and named in told
     assert main([str(table)]) == BAD_INPUT
     assert '--out FILE or --motion FILE' in capsys.readouterr().err
     assert not out.exists()
