@@ -94,11 +94,12 @@ def _stops(metrics: Mapping[str, Any]) -> list[Fact]:
     found = []
     for word, end, aim in (
             ('stop', 'came to rest', 'rest'), ('start', 'led to walking', 'walking')):
-        entries, done, count, overruled = (
-            metrics[word][key] for key in ('all', 'completed', 'count', 'overruled'))
+        entries, done, count, overruled, cut_off = (
+            metrics[word][key] for key in ('all', 'completed', 'count', 'overruled', 'cut_off'))
         if entries:
             apart = f'; another request ended {overruled} before' if overruled else ''
-            asked = count - overruled
+            apart += f'; the recording ended during {cut_off}' if cut_off else ''
+            asked = count - overruled - cut_off
             found += [Fact(f'Every {word} {end}', f'{done} of {asked}{apart}',
                            done == asked if asked else None), *_predictions(entries, aim)]
     if speeds := _known(metrics['stop']['all'], 'body_speed_at_rest_m_s'):

@@ -48,6 +48,7 @@ def test_an_empty_recording_has_no_numbers() -> None:
         'count': 0,
         'completed': 0,
         'overruled': 0,
+        'cut_off': 0,
         'all': 0,
     }
     assert json.loads(to_json(metrics)) == metrics
@@ -351,6 +352,20 @@ def test_a_stop_that_never_came_to_rest_counts_as_asked_only() -> None:
     events = tuple(event for event in walk.events() if event.message != 'at_rest')
     stop = metrics_of(walk, inhibition=events)['stop']
     assert (stop['count'], stop['completed'], stop['measured_s']) == (1, 0, None)
+
+
+@pytest.mark.parametrize(('bound', 'cut_off', 'holds'), [(2.5, 1, None), (1.5, 0, False)])
+def test_a_stop_that_the_recording_ends_within_its_bound_is_counted_apart(
+        bound: float, cut_off: int, holds: bool | None) -> None:
+    walk = SyntheticWalk()
+    free, waiting, *_ = walk.events()
+    last = walk.recording().span[1]
+    asked = dataclasses.replace(waiting, time=last - 2.0, values={
+        **waiting.values, 'request_stamp': repr(last - 2.0), 'bound_s': repr(bound)})
+    metrics = metrics_of(walk, inhibition=(free, asked))
+    told = {fact.statement: fact for fact in facts(metrics)}['Every stop came to rest']
+    assert (metrics['stop']['cut_off'], told.holds) == (cut_off, holds)
+    assert ('the recording ended during 1' in told.finding) == bool(cut_off)
 
 
 def test_a_stop_that_another_request_ended_is_counted_apart() -> None:

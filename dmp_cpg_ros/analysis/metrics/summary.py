@@ -38,7 +38,8 @@ def _summary(entries: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         **{key: slowest.get(key) for key in ('predicted_s', 'bound_s', 'measured_s')},
         'count': len(entries), 'completed': len(completed),
-        'overruled': sum(entry['overruled'] for entry in entries), 'all': entries}
+        **{key: sum(entry[key] for entry in entries) for key in ('overruled', 'cut_off')},
+        'all': entries}
 
 
 def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[str, Any]:
@@ -63,7 +64,7 @@ def _start(recording: Recording, start: Episode) -> dict[str, Any]:
 
 def _times(recording: Recording, episode: Episode, done: StatusEvent | None) -> dict[str, Any]:
     """Request, prediction, bound and measurement; the node's own numbers where it states them;
-    and whether another request ended it before it was done.
+    and whether another request, or within the bound the recording's end, came before it was done.
     """
     first = episode.events[0]
     stated = first.number('request_stamp')
@@ -74,10 +75,13 @@ def _times(recording: Recording, episode: Episode, done: StatusEvent | None) -> 
         measured = done.time - request
     following = next((event for event in recording.inhibition
                       if event.time >= episode.end and event not in episode.events), first)
+    overruled = measured is None and (
+        following.values.get('requested') != first.values.get('requested'))
+    bound, end = _promised(episode, done, 'bound_s'), recording.span[1]
     return {'request_s': request, 'predicted_s': _promised(episode, done, 'predicted_s'),
-            'bound_s': _promised(episode, done, 'bound_s'), 'measured_s': measured,
-            'overruled': measured is None and (
-                following.values.get('requested') != first.values.get('requested'))}
+            'bound_s': bound, 'measured_s': measured, 'overruled': overruled,
+            'cut_off': measured is None and not overruled and episode.end >= end
+            and bound is not None and end - request < bound}
 
 
 def _promised(episode: Episode, done: StatusEvent | None, key: str) -> float | None:
