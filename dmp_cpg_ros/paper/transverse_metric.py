@@ -285,7 +285,7 @@ def hopf_tube(oscillator: AndronovHopf, omega: float, disturbance: float
     omega : float
         Angular frequency > 0 [rad/s].
     disturbance : float
-        w̄ [1/s].
+        w̄ ≥ 0 [1/s]; ParameterError if it is not.
 
     Returns
     -------
@@ -296,6 +296,8 @@ def hopf_tube(oscillator: AndronovHopf, omega: float, disturbance: float
         when the disturbance can push the state through the origin.
     """
     rho, r = float(oscillator.rho), float(oscillator.radius)
+    if not disturbance >= 0.0:
+        raise ParameterError(f'disturbance = {disturbance!r} 1/s must not be negative')
     if disturbance >= rho * 2.0 * r**3 / (3.0 * 3.0**0.5):
         return None
     # ρ(r² − s²)s = w̄ between its maximum at r/√3 and r; −ρ(r² − s²)s = w̄ beyond r.

@@ -40,8 +40,8 @@ class CouplingGraph:
     Raises
     ------
     ParameterError
-        If an edge names a node that is not there, or a gain's symmetric part is not positive
-        definite.
+        If there is no node, shapes do not fit, an edge names a node that is not there, or a
+        gain's symmetric part is not positive definite.
     """
 
     size: int
@@ -51,6 +51,8 @@ class CouplingGraph:
 
     def __post_init__(self) -> None:
         """Validate."""
+        if self.size < 1:
+            raise ParameterError(f'size = {self.size!r} must be at least 1')
         if self.gains.shape != (len(self.edges), 2, 2) or self.phases.shape != (self.size,):
             raise ParameterError(
                 f'{len(self.edges)} edges and {self.size} nodes need gains '
@@ -146,6 +148,9 @@ def graph_from_edges(size: int, edges: Edges, gain: float | Array,
     CouplingGraph
     """
     K = np.asarray(gain, dtype=float)
+    if K.shape not in ((), (2, 2), (len(edges),)):
+        raise ParameterError(f'a gain is a number, one for each of {len(edges)} edges, or a '
+                             f'matrix (2, 2), not {K.shape}')
     K = K if K.ndim == 2 else K[..., None, None] * np.eye(2)
     gains = np.broadcast_to(K, (len(edges), 2, 2)).copy()
     return CouplingGraph(
@@ -185,7 +190,7 @@ def topology(name: str, size: int) -> Edges:
         'star': [(0, i) for i in range(1, size)],
     }
     if name == 'directed_ring':
-        return tuple((j, i) for i, j in following + [(size - 1, 0)])
+        return tuple((j, i) for i, j in following + [(size - 1, 0)][:size - 1])
     if name not in undirected:
         raise ParameterError(f"topology '{name}' must be {', '.join(undirected)} or directed_ring")
     return tuple(edge for i, j in undirected[name] for edge in ((i, j), (j, i)))

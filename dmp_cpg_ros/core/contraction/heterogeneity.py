@@ -105,6 +105,8 @@ def disagreement(weights: Array, z: NDArray[np.complex128]
 
 
 def _farthest(weights: Array) -> tuple[float, float]:
+    if len(weights) == 1:
+        return 0.0, 0.0
     smallest, second = sorted(weights.tolist())[:2]
     return sqrt(1.0 / smallest + 1.0 / second), sqrt((1.0 - smallest) / smallest)
 

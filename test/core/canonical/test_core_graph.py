@@ -9,7 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.coupling import (
+    TOPOLOGIES,
+    CouplingGraph,
+    graph_from_edges,
+    topology,
+)
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
 
@@ -75,6 +80,9 @@ def test_turning_each_node_into_its_place_gives_the_block_laplacian(seed: int) -
     (((0, 1),), 0.0, 'positive definite'),
     (((0, 1),), np.diag([1.0, -0.1]), 'smallest eigenvalue is -0.1'),
     (((0, 1),), np.nan, 'finite'),
+    (((0, 1), (1, 0)), np.ones(3), 'one for each of 2 edges'),
+    (((0, 1), (1, 0)), np.ones((2, 2, 2)), r'not \(2, 2, 2\)'),
+    (((0, 1), (1, 0)), np.array([[1.0, 2.0]]), r'not \(1, 2\)'),
 ])
 def test_impossible_graphs_are_refused(
         edges: tuple[tuple[int, int], ...], gain: float | np.ndarray, words: str) -> None:
@@ -90,6 +98,13 @@ def test_sparse_graphs_of_many_nodes_are_made_without_the_dense_one() -> None:
 def test_shapes_must_fit() -> None:
     with pytest.raises(ParameterError, match='need gains'):
         CouplingGraph(2, ((0, 1),), np.eye(2), np.zeros(2))
+
+
+@pytest.mark.parametrize('name', TOPOLOGIES)
+def test_one_oscillator_has_no_coupling_and_none_are_no_graph(name: str) -> None:
+    assert topology(name, 1) == ()
+    with pytest.raises(ParameterError, match='at least 1'):
+        graph_from_edges(0, topology(name, 0), 1.0)
 
 
 def test_an_unknown_topology_lists_the_known_ones() -> None:

@@ -111,6 +111,13 @@ def test_stronger_coupling_makes_the_disagreement_as_small_as_one_likes() -> Non
     assert bounds[0] > 8.0 * bounds[1] > 64.0 * bounds[2]
 
 
+def test_one_oscillator_agrees_with_itself() -> None:
+    graph = graph_from_edges(1, (), 20.0)
+    bound = mismatch_bound(synchronisation(graph, 8.0), 8.0, 0.7, 1.0)
+    assert (bound.disagreement, bound.distance, bound.phase_spread) == (0.0, 0.0, 0.0)
+    assert 0.69 < bound.smallest_radius <= 0.7
+
+
 def test_nothing_is_promised_for_networks_that_are_not_certified() -> None:
     graph = graph_from_edges(4, topology('path', 4), 5.0)
     weak = synchronisation(graph, 8.0)
@@ -143,6 +150,12 @@ def test_a_disturbed_oscillator_stays_in_its_tube(rho: float, omega: float, shar
         x = x + h * (oscillator.field(half, omega) + w)
         assert abs(np.linalg.norm(x) - 1.0) <= radius
         assert annulus.inner - 1e-4 <= np.linalg.norm(x) <= annulus.outer + 1e-4
+
+
+@pytest.mark.parametrize('disturbance', [-1.0, np.nan])
+def test_a_disturbance_is_no_less_than_none(disturbance: float) -> None:
+    with pytest.raises(ParameterError, match='must not be negative'):
+        hopf_tube(AndronovHopf(3.0), 5.0, disturbance)
 
 
 def test_a_disturbance_that_reaches_the_origin_has_no_tube() -> None:
