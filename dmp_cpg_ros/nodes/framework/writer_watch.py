@@ -95,32 +95,43 @@ class WriterWatch:
         stranger = number is not None and number == self._stranger + 1
         if number is None or (self._continues(ahead, passed_ns, now_ns)
                               and not (silent and stranger)):
-            if ahead > 0 and (self._learned < LEARNING or passed_ns < ahead * self._tick_ns):
-                self._learned += 1
-                own_ns = passed_ns // max(1, ahead - self._repeats)
-                self._tick_ns = min(self._tick_ns or own_ns, own_ns)
-            self._repeats = 0
-            self._last, self._stamp_ns = number or 0, stamp_ns
-            # What is sent again after a loss is received later than what waited behind it.
-            self._heard_ns = max(self._heard_ns, now_ns)
+            self._take(number or 0, stamp_ns, now_ns)
             return True
         if silent:
             alone = self._may_take_over()
             if alone is None and not (self._ticked or self.known) and self._stranger < 0:
                 return True  # nothing tells the writer from others before its topic has one
             if alone or (alone is None and self._ticked and not stranger):
-                goes_on = number == self._tried[0] + 1 and stamp_ns > self._tried[1]
-                self._tried = number, stamp_ns, 1 + (self._tried[2] if goes_on else 0)
-                if alone or self._lock_step or self._tried[2] >= PROVEN:
-                    self._begin(number, stamp_ns, now_ns)
-                    if alone:  # whoever was one has left, or is the writer that has come back
-                        self._stranger = -1
-                    return True
-                return False
+                return self._takes_over(number, stamp_ns, now_ns, bool(alone))
         self._tried, self._stranger_ns = (0, 0, 0), now_ns
         if stranger or not (silent and self._ticked):
             self._stranger = number
         return False
+
+    def _take(self, number: int, stamp_ns: int, now_ns: int) -> None:
+        """Take a message of the writer, which tells how long a tick is."""
+        ahead, passed_ns = number - self._last, stamp_ns - self._stamp_ns
+        if ahead > 0 and (self._learned < LEARNING or passed_ns < ahead * self._tick_ns):
+            self._learned += 1
+            own_ns = passed_ns // max(1, ahead - self._repeats)
+            self._tick_ns = min(self._tick_ns or own_ns, own_ns)
+        self._repeats = 0
+        self._last, self._stamp_ns = number, stamp_ns
+        # What is sent again after a loss is received later than what waited behind it.
+        self._heard_ns = max(self._heard_ns, now_ns)
+
+    def _takes_over(self, number: int, stamp_ns: int, now_ns: int, alone: bool) -> bool:
+        """Whether a message makes its publisher the writer: at once where it is alone, or nothing
+        is lost, else after ``PROVEN`` of them in a row.
+        """
+        goes_on = number == self._tried[0] + 1 and stamp_ns > self._tried[1]
+        self._tried = number, stamp_ns, 1 + (self._tried[2] if goes_on else 0)
+        if not (alone or self._lock_step or self._tried[2] >= PROVEN):
+            return False
+        self._begin(number, stamp_ns, now_ns)
+        if alone:  # whoever was one has left, or is the writer that has come back
+            self._stranger = -1
+        return True
 
     def forget(self) -> None:
         """Forget the writer, of which somebody knows that it was started again."""
