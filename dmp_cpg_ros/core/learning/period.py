@@ -19,7 +19,9 @@ correlated from sample to sample.
 """
 
 _BENDING = 4.0
-"""How many times less a multiple of a period must leave to be no bend of it."""
+"""How many times less a multiple of a period must leave to be a period of its own, where that
+frequency wanders: a longer series bends to it, and leaves somewhat less.
+"""
 
 _HARMONICS = 8
 _COARSE_SAMPLES = 500
@@ -76,8 +78,8 @@ def find_period(demonstration: Demonstration, shortest: float | None = None,
     left, best = min((error, f) for f, error in refined)
     # What a period leaves is noise, or a frequency that wanders: its multiples bend to that.
     spare = 1.1 if whole.residual_correlation(best) <= 0.5 else _BENDING
-    shortest = max(f for f, error in refined if error <= spare * left + 1e-6)
-    left, frequency = min((error, f) for f, error in refined if f > 0.9 * shortest)
+    highest = max(f for f, error in refined if error <= spare * left + 1e-6)
+    left, frequency = min((error, f) for f, error in refined if f > 0.9 * highest)
     longer = frequency < low - 0.98 * reach  # no minimum: longer periods would fit even better
     wanders = left > WANDERING and whole.residual_correlation(frequency) > 0.5
     if longer or left > 0.5 or wanders:
