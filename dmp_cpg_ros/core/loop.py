@@ -25,12 +25,13 @@ from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait, limiting_gaits
 from dmp_cpg_ros.core.gait.transition import GaitInForce
-from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead
+from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead, next_gait
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.records import replace_unchecked
+from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.modes.body_control import BodyControl
 from dmp_cpg_ros.core.modes.leg_control import LegControl
 from dmp_cpg_ros.core.modes.manager import ModeState
@@ -220,9 +221,13 @@ class WalkingLoop:
         self.stop = self.supervisor.request(self.stop, stop)
         self.outlook = look_ahead(
             self.supervisor, self.reference, self.canonical, self.stop, self.inhibition,
-            self.canon, self.r, self.gate.foreseen(self.stop.time_ns + round(1e9 * self._dt)),
-            self._dt)
+            self.canon, self.r, self._foreseen, self._dt)
         return self.outlook.time_s
+
+    @property
+    def _foreseen(self) -> Triple:
+        """Command that will act at the next tick."""
+        return self.gate.foreseen(self.stop.time_ns + round(1e9 * self._dt))
 
     def change(self, values: Mapping[str, Any]) -> str:
         """Change parameters as the nodes' services do; they act from the next tick on.
@@ -278,8 +283,10 @@ class WalkingLoop:
             self.network.of(slow), self.x, self.r, self.stop.quickness)
 
     def in_force(self) -> Running:
-        """What runs, in the gait in force or in the change between two."""
-        first, *others = (self._reader.named(end.name) for end in self.canon.gait.ends)
+        """What runs, in the gait in force or in the change between two when a request acts."""
+        gait = next_gait(self.reference, self.canonical, self.inhibition, self.canon, self.r,
+                         self._foreseen, self._dt)
+        first, *others = (self._reader.named(end.name) for end in gait.ends)
         return replace(self._described(self.parameters, first), others=tuple(others))
 
     def _contact_limits(self, dt: float) -> ContactLimits | None:

@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import CanonicalState
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.handover import adopted
-from dmp_cpg_ros.core.inhibition.prediction import look_ahead
+from dmp_cpg_ros.core.inhibition.prediction import look_ahead, next_gait
 from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.maths.constants import GRAVITY
@@ -89,6 +89,7 @@ class InhibitionNode(SuiteNode):
         self._x_dot: Any = None
         self._r, self._body_mode = np.zeros(3), 'standing'
         self._promise, self._promised_for = Promise(), self._running
+        self._foreseen = (0.0, 0.0, 0.0)
         self._due_ns, self._told_ns, self._blind = inf, -HEARTBEAT_NS, ''
         self._drive, self._joined, self._asked = FOLLOWING, False, False
         self._began_ns = -1
@@ -127,9 +128,11 @@ class InhibitionNode(SuiteNode):
         self._network = self._running_gait.network(self._network.gait)
         self._slow = self._unhurried(self._network.gait)
         self.certified.limit(self._gate)
-        under_way = self._joined and not isfinite(self._state.measured_s)
-        if under_way and not gate.UNCERTIFIED.issuperset(self._running.differences(
-                self._promised_for)):
+        if not self._joined or isfinite(self._state.measured_s):
+            return
+        # until a request acts a change of gait may begin, of which no inequality depends
+        if self._state.time_ns == self._state.request_ns or not gate.UNCERTIFIED.issuperset(
+                self._running.differences(self._promised_for)):
             self._predict()
 
     def _build(self) -> None:
@@ -159,8 +162,10 @@ class InhibitionNode(SuiteNode):
             self._votes.tally, self._barring, margins, progress, self.certified.wanted)
         self._acting = self._supervisor.inhibition(self._state)
         self._due_ns += min(0, stamp_ns - before.time_ns)  # it goes with a clock that is set back
-        if self._state.requested != before.requested:
-            self._predict()
+        changed = self._state.requested != before.requested
+        if changed or (self._state.requested and before.time_ns == before.request_ns
+                       and self._gate.foreseen(stamp_ns) != self._foreseen):
+            self._predict()  # by itself, or anew: another command came before the request acted
         self._tell_block(before)
         news = self._news() != self._told
         if news:
@@ -335,15 +340,19 @@ class InhibitionNode(SuiteNode):
         """Look ahead to the rest or the walk that was requested, just now or before parameters
         have changed.
         """
-        gait, state, running = self._network.gait, self._state, self._running
-        canon = CanonicalState(
-            gait, self.certified.gaits.named(gait_name(self)), self._slow.gait.cadence_scale,
-            self._x, self._x_dot, initial_contact_state())
+        state = self._state
+        present = self._network.gait
+        wanted = self.certified.wanted or self.certified.gaits.named(present.ends[-1].name)
+        canon = CanonicalState(present, wanted, self._slow.gait.cadence_scale,
+                               self._x, self._x_dot, initial_contact_state())
         tick_ns = self.parameters_of(TickParameters).tick_ns
-        command = self._gate.foreseen(state.time_ns + tick_ns)
+        self._foreseen = command = self._gate.foreseen(state.time_ns + tick_ns)
         outlook = look_ahead(
             self._supervisor, self._reference, self._running_gait, state, self._acting,
             canon, self._r, command, tick_ns * 1e-9, body_mode=self._barring)
+        gait = next_gait(self._reference, self._running_gait, self._acting, canon, self._r,
+                         command, tick_ns * 1e-9)
+        running = self.certified.running_in(gait)
         way = running.stop_distance(self._r, command) if state.requested else nan
         if state.requested and state.voted:
             bound = self._bound_by_votes()

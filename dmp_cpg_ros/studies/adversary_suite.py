@@ -130,11 +130,7 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: _Expected | None,
     """Do what an event says; what is expected of the stop or the start that is under way."""
     if loop.inhibition.requested if kind == 'take_over' else (
             kind == 'stop' and not loop.stop.requested):
-        bound = loop.time_to_rest() if loop.certified() else np.inf
-        way = loop.in_force().stop_distance(loop.r, loop.gate.foreseen(loop.now_ns + loop.tick_ns))
-        predicted = loop.take_over() if kind == 'take_over' else loop.request(True)
-        predicted = min(predicted, LONGEST) if not loop.voted_now else np.nan
-        return _Expected(loop.now_ns, True, bound, predicted, way)
+        return _promised(loop, loop.take_over if kind == 'take_over' else None)
     if kind in ('stop', 'take_over'):
         return expected
     if kind == 'start':
@@ -149,8 +145,7 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: _Expected | None,
         if expected is not None and not expected.stop:
             return None
         if expected is not None and expected.since_ns == loop.now_ns:
-            # it acts for the tick until the request does
-            return expected._replace(predicted_s=np.nan, bound_m=np.inf)
+            return _promised(loop)  # it acts for the tick until the request does
     elif kind == 'vote':
         loop.vote(value)
         return None
@@ -162,9 +157,19 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: _Expected | None,
         except DmpCpgError:
             accepted = False
         counts['accepted'] += accepted
-        # What was said holds for the parameters that it was said for.
-        return None if accepted else expected
+        # What was said holds for the parameters that it was said for; a stop is said anew.
+        if accepted:
+            return _promised(loop) if expected is not None and expected.stop else None
     return expected
+
+
+def _promised(loop: Oscillators, predict: Callable[[], float] | None = None) -> _Expected:
+    """What is said of a stop that is requested now or is under way."""
+    bound = loop.time_to_rest() if loop.certified() else np.inf
+    way = loop.in_force().stop_distance(loop.r, loop.gate.foreseen(loop.now_ns + loop.tick_ns))
+    predicted = predict() if predict is not None else loop.request(True)
+    predicted = min(predicted, LONGEST) if not loop.voted_now else np.nan
+    return _Expected(loop.now_ns, True, bound, predicted, way)
 
 
 _NUMBERS = {'coupling_gain': (8.0, 400.0), 'rho': (0.5, 20.0), 'inhibition_gain': (60.0, 4000.0),

@@ -130,8 +130,8 @@ def test_no_node_accepts_what_the_gait_that_is_still_walked_does_not_bear(
 
 SEVERAL = """\
 name: several
-duration: 9.0
-parameters: {auto_delay: 0.2}
+duration: 13.0
+parameters: {auto_delay: 0.2, gait_change_rate: 0.5}
 events:
   - {at: 0.1, command: {v_x: 0.4}}
   - {at: 0.1, inhibit: false}
@@ -146,6 +146,14 @@ events:
   - {at: 5.0, inhibit: false}
   - {at: 5.0, command: silence}
   - {at: 5.74, set: {alpha_r: 2.0}}
+  - {at: 8.0, set: {alpha_r: 4.0}}
+  - {at: 8.0, command: {v_x: 0.04}}
+  - {at: 9.0, inhibit: true}
+  - {at: 9.0, command: {v_x: 0.5}}
+  - {at: 10.0, command: {v_x: 0.1}}
+  - {at: 10.0, inhibit: false}
+  - {at: 11.32, inhibit: true}
+  - {at: 11.32, gait: pace}
 """
 
 
@@ -158,17 +166,23 @@ def test_several_changes_and_requests_within_a_tick_act_as_they_are_predicted(
             item for name, value in settings.items() for item in ('--set', f'{name}:={value}')))
     assert process.wait(RUN_S) == 0, str(process)
     metrics = json.loads((tmp_path / 'run' / 'metrics.json').read_text(encoding='utf-8'))
-    for kind, count in (('stop', 2), ('start', 2)):
+    recording = load_recording(tmp_path / 'run' / 'bag')
+    for kind, count in (('stop', 4), ('start', 4)):
         entries = [entry for entry in metrics[kind]['all'] if not entry['overruled']]
         assert len(entries) == count, metrics[kind]
         for entry in entries:
             assert entry['measured_s'] == pytest.approx(entry['predicted_s'], abs=1e-9), entry
             assert entry['measured_s'] <= entry['bound_s'], entry
+            if kind == 'stop':
+                of, since = recording.reference, entry['request_s']
+                taken = (of.time > since) & (of.time <= since + entry['measured_s'])
+                way = np.hypot(*of.value[taken, :2].T).sum() / SHARED_HZ
+                assert way <= entry['distance_bound_m'], entry
     for log in (tmp_path / 'run' / 'logs').iterdir():
         assert 'was to rest by' not in log.read_text(encoding='utf-8')
     plain = tmp_path / 'plain.yaml'
     plain.write_text(SEVERAL, encoding='utf-8')
-    recording, (_, ticks) = load_recording(tmp_path / 'run' / 'bag'), plain_run(plain, **settings)
+    _, ticks = plain_run(plain, **settings)
     np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
 
 

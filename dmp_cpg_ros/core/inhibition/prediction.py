@@ -18,6 +18,7 @@ from typing import NamedTuple
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
 from dmp_cpg_ros.core.gait.running import CanonicalState, RunningGait
+from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.maths import Array
@@ -140,6 +141,17 @@ def ticks_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonica
                                 canon.x, canon.x_dot, r, command, body_mode=body_mode)
         inhibition = supervisor.inhibition(state)
         yield state, inhibition, canon, r
+
+
+def next_gait(reference: ReferenceSystem, canonical: RunningGait, published: Inhibition,
+              canon: CanonicalState, r: Array, command: tuple[float, float, float], dt: float
+              ) -> GaitInForce:
+    """Gait in force at the next tick; the parameters are those of :func:`look_ahead`.
+
+    A request acts a tick later: a change of gait may begin until then, and a stop in which it
+    does waits until the change stands still.
+    """
+    return canonical.step(canon, reference.towards(r, command, published, dt), published, dt).gait
 
 
 def _up(canon: CanonicalState, state: SupervisorState, duty: float) -> bool:

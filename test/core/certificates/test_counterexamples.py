@@ -104,6 +104,27 @@ def test_a_stop_while_the_cadence_moves_is_predicted_to_the_tick(first: float, t
     assert measured == pytest.approx(predicted, abs=1e-9)
 
 
+@pytest.mark.parametrize('asked_first', [True, False])
+def test_a_stop_in_whose_tick_a_change_of_gait_begins_is_bounded_with_its_pause(
+        asked_first: bool) -> None:
+    walk = Walk(alpha_r=12.0)
+    walk.walk(0.3, 2.0)
+    plain = walk.loop.time_to_rest()
+    if asked_first:
+        walk.loop.request(True)
+    assert accepted(walk, gait='trot')
+    bound, predicted = walk.loop.time_to_rest(), walk.loop.request(True)
+    walk.tick()
+    assert walk.loop.canon.gait.name == 'amble>trot'
+    assert walk.loop.time_to_rest() <= bound
+    assert bound > plain + 0.1
+    ticks = 1
+    while walk.loop.stop.state != 'at_rest':
+        walk.tick()
+        ticks += 1
+    assert ticks * TICK == pytest.approx(predicted, abs=1e-9)
+
+
 def test_a_stop_after_the_speed_limit_was_lowered_is_bounded_from_where_the_reference_is() -> None:
     walk = Walk('trot')
     walk.walk(3.0, 4.0)
