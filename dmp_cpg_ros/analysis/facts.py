@@ -97,7 +97,7 @@ def _stops(metrics: Mapping[str, Any]) -> list[Fact]:
         entries, done, count, overruled, cut_off = (
             metrics[word][key] for key in ('all', 'completed', 'count', 'overruled', 'cut_off'))
         if entries:
-            apart = f'; another request ended {overruled} before' if overruled else ''
+            apart = f'; another request or a push ended {overruled} before' if overruled else ''
             apart += f'; the recording ended during {cut_off}' if cut_off else ''
             asked = count - overruled - cut_off
             found += [Fact(f'Every {word} {end}', f'{done} of {asked}{apart}',

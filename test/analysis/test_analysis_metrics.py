@@ -378,11 +378,22 @@ def test_a_stop_that_another_request_ended_is_counted_apart() -> None:
     assert (stop['count'], stop['completed'], stop['overruled']) == (2, 1, 1)
     assert [entry['overruled'] for entry in stop['all']] == [True, False]
     rested = told['Every stop came to rest']
-    assert rested.holds and rested.finding == '1 of 1; another request ended 1 before'
+    assert rested.holds and rested.finding == '1 of 1; another request or a push ended 1 before'
     metrics = metrics_of(walk, inhibition=(free, waiting, captured, releasing))
     told = {fact.statement: fact for fact in facts(metrics)}
     assert told['Every stop came to rest'].holds is None
     assert told['Every start led to walking'].holds is False  # the recording ended before
+
+
+def test_a_stop_that_a_push_released_is_counted_apart() -> None:
+    walk = SyntheticWalk()
+    free, waiting, captured, at_rest, *_ = walk.events()
+    pushed = dataclasses.replace(
+        captured, message='stepping', values={**waiting.values, 'pushed': 'true'})
+    again = [dataclasses.replace(event, time=event.time + 1.0) for event in (waiting, at_rest)]
+    metrics = metrics_of(walk, inhibition=(free, waiting, pushed, *again))
+    told = {fact.statement: fact for fact in facts(metrics)}['Every stop came to rest']
+    assert told.holds and told.finding == '1 of 1; another request or a push ended 1 before'
 
 
 def test_standing_before_the_first_start_is_no_stop() -> None:

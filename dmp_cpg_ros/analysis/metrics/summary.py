@@ -64,7 +64,8 @@ def _start(recording: Recording, start: Episode) -> dict[str, Any]:
 
 def _times(recording: Recording, episode: Episode, done: StatusEvent | None) -> dict[str, Any]:
     """Request, prediction, bound and measurement; the node's own numbers where it states them;
-    and whether another request, or within the bound the recording's end, came before it was done.
+    whether another request or a push came before it was done, or within the bound the recording's
+    end.
     """
     first = episode.events[0]
     stated = first.number('request_stamp')
@@ -75,8 +76,8 @@ def _times(recording: Recording, episode: Episode, done: StatusEvent | None) -> 
         measured = done.time - request
     following = next((event for event in recording.inhibition
                       if event.time >= episode.end and event not in episode.events), first)
-    overruled = measured is None and (
-        following.values.get('requested') != first.values.get('requested'))
+    overruled = measured is None and any(
+        following.values.get(what) != first.values.get(what) for what in ('requested', 'pushed'))
     bound, end = _promised(episode, done, 'bound_s'), recording.span[1]
     return {'request_s': request, 'predicted_s': _promised(episode, done, 'predicted_s'),
             'bound_s': bound, 'measured_s': measured, 'overruled': overruled,
