@@ -24,6 +24,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.modes.falls import FALLEN_TILT
 from dmp_cpg_ros.nodes.framework.health import Durations, ReadinessOfOthers
 from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, interface
 from dmp_cpg_ros.nodes.messages.values import header_ns
@@ -35,8 +36,8 @@ READY_WITHIN_S = 120.0
 COMMAND_EVERY_S = 0.1
 """How often the command is repeated [s]: one that has been lost is worth nothing later."""
 
-FALLEN_TILT, LOW = 0.9, 0.7
-"""Tilt of a robot that has fallen [rad]; share of its first height below which it lies."""
+LOW = 0.7
+"""Share of its first height below which a robot lies."""
 
 FAR_NS = 10**18
 """Up to when the gate opens [ns]."""

@@ -35,7 +35,8 @@ from dmp_cpg_ros.analysis.motion import tilt
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
-from dmp_cpg_ros.studies.link_watch import FALLEN_TILT, posture
+from dmp_cpg_ros.core.modes.falls import FALLEN_TILT
+from dmp_cpg_ros.studies.link_watch import posture
 from dmp_cpg_ros.studies.output import folder_of_logs, markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.walk_process import WITHIN_S, WalkProcess, ahead
 from dmp_cpg_ros.suite import load_gaits

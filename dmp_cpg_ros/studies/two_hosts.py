@@ -34,6 +34,7 @@ from dmp_cpg_ros.commands.ros_arguments import RosArguments, positive, run_comma
 from dmp_cpg_ros.commands.suite_run import ENDED_WITHIN_S
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.modes.falls import FALLEN_TILT
 from dmp_cpg_ros.nodes.framework.execution import (
     PROFILES,
     RANGE,
@@ -42,7 +43,7 @@ from dmp_cpg_ros.nodes.framework.execution import (
     prepare_middleware,
 )
 from dmp_cpg_ros.nodes.framework.parameters import BEST_EFFORT, DELIVERIES
-from dmp_cpg_ros.studies.link_watch import FALLEN_TILT, LinkWatch
+from dmp_cpg_ros.studies.link_watch import LinkWatch
 from dmp_cpg_ros.studies.lossy_link import Conditions
 from dmp_cpg_ros.studies.network_hosts import TwoHosts
 from dmp_cpg_ros.studies.output import folder_of_logs, markdown_table, parser_of, write_results
