@@ -89,7 +89,7 @@ class InhibitionNode(SuiteNode):
         self._x_dot: Any = None
         self._r, self._body_mode = np.zeros(3), 'standing'
         self._promise, self._promised_for = Promise(), self._running
-        self._foreseen = (0.0, 0.0, 0.0)
+        self._foreseen, self._anew = (0.0, 0.0, 0.0), False
         self._due_ns, self._told_ns, self._blind = inf, -HEARTBEAT_NS, ''
         self._drive, self._joined, self._asked = FOLLOWING, False, False
         self._began_ns = -1
@@ -128,12 +128,9 @@ class InhibitionNode(SuiteNode):
         self._network = self._running_gait.network(self._network.gait)
         self._slow = self._unhurried(self._network.gait)
         self.certified.limit(self._gate)
-        if not self._joined or isfinite(self._state.measured_s):
-            return
         # until a request acts a change of gait may begin, of which no inequality depends
-        if self._state.time_ns == self._state.request_ns or not gate.UNCERTIFIED.issuperset(
-                self._running.differences(self._promised_for)):
-            self._predict()
+        self._anew |= self._state.time_ns == self._state.request_ns or not (
+            gate.UNCERTIFIED.issuperset(self._running.differences(self._promised_for)))
 
     def _build(self) -> None:
         of = self.parameters_of
@@ -162,18 +159,15 @@ class InhibitionNode(SuiteNode):
             self._votes.tally, self._barring, margins, progress, self.certified.wanted)
         self._acting = self._supervisor.inhibition(self._state)
         self._due_ns += min(0, stamp_ns - before.time_ns)  # it goes with a clock that is set back
-        changed = self._state.requested != before.requested
-        if changed or (self._state.requested and before.time_ns == before.request_ns
-                       and self._gate.foreseen(stamp_ns) != self._foreseen):
-            self._predict()  # by itself, or anew: another command came before the request acted
         self._tell_block(before)
-        news = self._news() != self._told
-        if news:
-            self._publish()
         balance = (self._state.share, self._state.quickness)
-        if (news or self.lock_step or balance != (before.share, before.quickness)
+        if (self._news() != self._told or self.lock_step
+                or balance != (before.share, before.quickness)
                 or not 0 <= stamp_ns - self._told_ns < HEARTBEAT_NS):
             self._publish_gains()
+        self._predict_what_is_new(before)  # takes several ticks, for which nobody is to wait
+        if self._news() != self._told:
+            self._publish()
         if self.lock_step:
             self._memory.publish(
                 self._memory_writer.fill(
@@ -182,6 +176,17 @@ class InhibitionNode(SuiteNode):
             self._blind = ''
             self.clear('blind')
         self._watch_bound(stamp_ns)
+
+    def _predict_what_is_new(self, before: SupervisorState) -> None:
+        """Predict a stop or a start that began in this tick, or one that is under way anew when
+        parameters have changed, or another command has come before the request acted.
+        """
+        state, anew, self._anew = self._state, self._anew, False
+        overtaken = state.requested and before.time_ns == before.request_ns and (
+            self._gate.foreseen(state.time_ns) != self._foreseen)
+        if state.requested != before.requested or (
+                (anew or overtaken) and not isfinite(state.measured_s)):
+            self._predict()
 
     def _tell_block(self, before: SupervisorState) -> None:
         """Say that the robot has stopped by itself, and when it no longer has."""
@@ -255,9 +260,9 @@ class InhibitionNode(SuiteNode):
         if not self._state.in_force or self._state.automatic and not automatic:
             self._state = self._supervisor.request(self._state, True, automatic)
             self._acting = self._supervisor.inhibition(self._state)
+            self._publish_gains()
             self._predict()
             self._publish()
-            self._publish_gains()
 
     def _watch(self, now_ns: int) -> None:
         """Notice on the robot's clock that nothing is known of the gait any more."""
@@ -299,7 +304,7 @@ class InhibitionNode(SuiteNode):
 
     def _take_request(self, request: Any) -> tuple[bool, str]:
         """Take a request; the answer says when it will be fulfilled. It acts from the next tick
-        on.
+        on: in lock-step from that of this node, else from the next one of the oscillators.
         """
         stop: bool = request.data
         self._asked = True
@@ -327,6 +332,9 @@ class InhibitionNode(SuiteNode):
         if already:
             return True, ('stopped already, and steps to catch a push' if steps and stop
                           else f'already {self._state.state}')
+        if not self.lock_step:  # what it takes to predict must not delay it
+            self._acting = self._supervisor.inhibition(self._state)
+            self._publish_gains()
         self._predict()
         return True, self._promise.words(
             stop, self._words(), self._supervisor.parameters.push_recovery)

@@ -225,10 +225,20 @@ def test_real_time_run_stops_and_starts(processes: Processes, tmp_path: Path) ->
     with opened(run / 'bag') as reader:
         # When the recorder ends, another topic of the robot may be a tick ahead of the joints.
         assert reader.start_time >= 0 and reader.end_time <= end * 1e9 + TICK_NS + 1
+        told = [reader.deserialize(raw, of.msgtype) for of, _, raw in reader.messages(
+            [of for of in reader.connections if of.topic == '/inhibition_gains'])]
+    requested = [message.position[message.name.index('requested')] for message in told]
+    turned = [message.header.stamp for message, now, before in zip(
+        told[1:], requested[1:], requested, strict=False) if now != before]
     metrics = json.loads((run / 'metrics.json').read_text(encoding='utf-8'))
     assert metrics['robot']['fell'] is False
     # A robot whose controllers starve may have stood by itself before.
     assert metrics['stop']['completed'] >= 1 and metrics['start']['completed'] >= 1
+    # A request is told before it is predicted, which takes ticks.
+    asked = {round(entry['request_s'], 6)
+             for of in ('stop', 'start') for entry in metrics[of]['all']}
+    assert len(turned) >= 2 and asked.issuperset(
+        round(stamp.sec + 1e-9 * stamp.nanosec, 6) for stamp in turned)
     for name in (
         'rate_hz',
         'real_time_factor',
