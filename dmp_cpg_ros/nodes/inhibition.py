@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import CanonicalState
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.handover import adopted
-from dmp_cpg_ros.core.inhibition.prediction import look_ahead, next_gait
+from dmp_cpg_ros.core.inhibition.prediction import Outlook, looking_ahead, next_gait
 from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.maths.constants import GRAVITY
@@ -40,6 +40,7 @@ from dmp_cpg_ros.core.voting.votes import VoteInbox
 from dmp_cpg_ros.core.voting.voting import Voting
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
+from dmp_cpg_ros.nodes.framework.judging import Later, Slices
 from dmp_cpg_ros.nodes.framework.known_stop import OthersKnow
 from dmp_cpg_ros.nodes.framework.promise import Promise
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
@@ -60,6 +61,9 @@ HEARTBEAT_NS = 100_000_000
 
 JOIN_EVERY_S = 0.1
 """In lock-step, how often a restarted node looks whether it has been told what acts [s]."""
+
+PREDICTED_AT_ONCE = 10
+"""Ticks ahead that are computed between two callbacks: about 1 ms."""
 
 BLIND_NS = 250_000_000
 """Time on the robot's clock without a tick after which nothing is known of the gait [ns]."""
@@ -90,6 +94,8 @@ class InhibitionNode(SuiteNode):
         self._r, self._body_mode = np.zeros(3), 'standing'
         self._promise, self._promised_for = Promise(), self._running
         self._foreseen, self._anew = (0.0, 0.0, 0.0), False
+        self._slices = Slices(self, PREDICTED_AT_ONCE)
+        self._answers: list[tuple[bool, Later]] = []
         self._due_ns, self._told_ns, self._blind = inf, -HEARTBEAT_NS, ''
         self._drive, self._joined, self._asked = FOLLOWING, False, False
         self._began_ns = -1
@@ -302,7 +308,7 @@ class InhibitionNode(SuiteNode):
 
     # The service -------------------------------------------------------------------------------
 
-    def _take_request(self, request: Any) -> tuple[bool, str]:
+    def _take_request(self, request: Any) -> tuple[bool, str] | Later:
         """Take a request; the answer says when it will be fulfilled. It acts from the next tick
         on: in lock-step from that of this node, else from the next one of the oscillators.
         """
@@ -335,7 +341,15 @@ class InhibitionNode(SuiteNode):
         if not self.lock_step:  # what it takes to predict must not delay it
             self._acting = self._supervisor.inhibition(self._state)
             self._publish_gains()
+        answer = Later()
+        self._answers = [*self._answers, (stop, answer)]
         self._predict()
+        return self._answer(stop) if not self._answers else answer
+
+    def _answer(self, stop: bool) -> tuple[bool, str]:
+        """What a request is answered once it has been predicted."""
+        if stop != self._state.in_force:
+            return True, 'another request came before it was predicted'
         return True, self._promise.words(
             stop, self._words(), self._supervisor.parameters.push_recovery)
 
@@ -346,7 +360,7 @@ class InhibitionNode(SuiteNode):
 
     def _predict(self) -> None:
         """Look ahead to the rest or the walk that was requested, just now or before parameters
-        have changed.
+        have changed; the bound is known at once.
         """
         state = self._state
         present = self._network.gait
@@ -355,9 +369,6 @@ class InhibitionNode(SuiteNode):
                                self._x, self._x_dot, initial_contact_state())
         tick_ns = self.parameters_of(TickParameters).tick_ns
         self._foreseen = command = self._gate.foreseen(state.time_ns + tick_ns)
-        outlook = look_ahead(
-            self._supervisor, self._reference, self._running_gait, state, self._acting,
-            canon, self._r, command, tick_ns * 1e-9, body_mode=self._barring)
         gait = next_gait(self._reference, self._running_gait, self._acting, canon, self._r,
                          command, tick_ns * 1e-9)
         running = self.certified.running_in(gait)
@@ -367,17 +378,32 @@ class InhibitionNode(SuiteNode):
         elif state.requested:
             bound = running.time_to_rest(self._slow, self._x, self._r, state.quickness)
         else:
-            bound = (self.certified.certificate_in(gait).time_to_walking
-                     if isfinite(outlook.time_s) else inf)
+            bound = self.certified.certificate_in(gait).time_to_walking
         self._due_ns = state.time_ns + 1e9 * bound if (
             state.requested and isfinite(bound)) else inf
-        promise = Promise(outlook.time_s, bound, way, outlook)
+        promise, self._promised_for = Promise(nan, bound, way), running
         if isfinite(state.measured_s):  # released by a push in full swing: it runs already
             promise = promise._replace(predicted_s=state.measured_s)
-        elif state.time_ns > state.request_ns:
-            promise = promise.told_later(
-                1e-9 * (state.time_ns - state.request_ns), self._promise.bound_m)
-        self._promise, self._promised_for = promise, running
+        since_s, before_m = 1e-9 * (state.time_ns - state.request_ns), self._promise.bound_m
+        later = not isfinite(state.measured_s) and since_s > 0.0
+
+        def known(outlook: Outlook) -> None:
+            told = promise._replace(outlook=outlook)
+            if not isfinite(state.measured_s):
+                told = told._replace(predicted_s=outlook.time_s)
+            if not (state.requested or isfinite(outlook.time_s)):
+                told = told._replace(bound_s=inf)
+            self._promise = told.told_later(since_s, before_m) if later else told
+            answers, self._answers = self._answers, []
+            for stop, answer in answers:
+                answer.deliver(self._answer(stop))
+            if self.active and not self.lock_step and self._news() != self._told:
+                self._publish()
+
+        self._promise = promise.told_later(since_s, before_m) if later else promise
+        self._slices.begin(looking_ahead(
+            self._supervisor, self._reference, self._running_gait, state, self._acting,
+            canon, self._r, command, tick_ns * 1e-9, body_mode=self._barring), known)
 
     def _bound_by_votes(self) -> float:
         """Bound on the time from now to rest under the votes [s]."""

@@ -11,9 +11,9 @@ flat, slopes and hills with friction of 0.3 to 1, a payload of up to 30 % and a 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from math import ceil, hypot, inf, nan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
@@ -78,11 +78,11 @@ class Outlook(NamedTuple):
         return self.way_m + fixed + share * self.speed
 
 
-def look_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
+def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
                state: SupervisorState, published: Inhibition, canon: CanonicalState, r: Array,
                command: tuple[float, float, float], dt: float, horizon: float = 10.0,
-               body_mode: str = 'standing') -> Outlook:
-    """Run ahead from a request.
+               body_mode: str = 'standing') -> Generator[None, None, Outlook]:
+    """Run ahead from a request, a tick at a time, to be returned what becomes of it.
 
     Parameters
     ----------
@@ -109,6 +109,7 @@ def look_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical
     for k, (state, _, canon, r) in zip(range(1, ceil(horizon / dt) + 1), ticks, strict=False):
         if state.requested != stop:
             break
+        yield
         if stop:
             way_m += dt * hypot(r[0], r[1])
             if _up(canon, state, canon.gait.pace(r, canonical.scale)[3]):
@@ -118,12 +119,23 @@ def look_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical
     return Outlook(inf, nan, nan, speed)
 
 
+def look_ahead(*arguments: Any, **options: Any) -> Outlook:
+    """What becomes of a request, at once; the parameters are those of :func:`looking_ahead`."""
+    ahead = looking_ahead(*arguments, **options)
+    while True:
+        try:
+            next(ahead)
+        except StopIteration as end:
+            outlook: Outlook = end.value
+            return outlook
+
+
 def ticks_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
                 state: SupervisorState, published: Inhibition, canon: CanonicalState, r: Array,
                 command: tuple[float, float, float], dt: float, body_mode: str = 'standing'
                 ) -> Iterator[tuple[SupervisorState, Inhibition, CanonicalState, Array]]:
     """Oscillators, reference and state of the stop tick by tick, without end; the parameters are
-    those of :func:`look_ahead`.
+    those of :func:`looking_ahead`.
 
     Yields
     ------
@@ -146,7 +158,7 @@ def ticks_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonica
 def next_gait(reference: ReferenceSystem, canonical: RunningGait, published: Inhibition,
               canon: CanonicalState, r: Array, command: tuple[float, float, float], dt: float
               ) -> GaitInForce:
-    """Gait in force at the next tick; the parameters are those of :func:`look_ahead`.
+    """Gait in force at the next tick; the parameters are those of :func:`looking_ahead`.
 
     A request acts a tick later: a change of gait may begin until then, and a stop in which it
     does waits until the change stands still.

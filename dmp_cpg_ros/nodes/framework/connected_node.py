@@ -13,6 +13,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from dmp_cpg_ros.nodes.framework.commands import Commands
+from dmp_cpg_ros.nodes.framework.judging import Later
 from dmp_cpg_ros.nodes.framework.lifecycle import GuardedLifecycleNode
 from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery, SuitePublisher
 from dmp_cpg_ros.nodes.framework.ticks import drain
@@ -173,14 +174,18 @@ class ConnectedNode(GuardedLifecycleNode):
         self._undo.append(partial(self.destroy_timer, self.create_steady_timer(
             period_s, look or self.look_after)))
 
-    def serve(self, name: str, take: Callable[[Any], tuple[bool, str]]) -> None:
-        """Create a service of the table; while the node is active, what takes its requests tells
-        whether they are accepted, and what will happen or why not.
+    def serve(self, name: str, take: Callable[[Any], tuple[bool, str] | Later]) -> None:
+        """Create a service of the table; while the node is active, what takes its requests tells,
+        now or later, whether they are accepted, and what will happen or why not.
         """
         def answer(request: Any, response: Any) -> Any:
-            response.success, response.message = take(request) if self.active else (
+            def filled(told: tuple[bool, str]) -> Any:
+                response.success, response.message = told
+                return response
+
+            told = take(request) if self.active else (
                 False, f'{self.get_name()} is {self.state_label}, not active')
-            return response
+            return told.made_by(filled) if isinstance(told, Later) else filled(told)
 
         service = interface(name)
         served = self.create_service(service.type, service.name, answer)

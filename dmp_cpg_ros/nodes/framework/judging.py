@@ -130,6 +130,56 @@ def _computed(node: SuiteNode, compute: Compute, use: Use, result: Any) -> None:
             compute() if isinstance(result, Exception) else result)))
 
 
+class Slices:
+    """What a node computes by itself, a slice at a time between its callbacks: it depends on too
+    much for another process. What is begun later takes the place of what is not done.
+
+    Parameters
+    ----------
+    node : SuiteNode
+        In lock-step, where the robot waits, and without an executor it computes at once.
+    length : int
+        Steps of a slice.
+    """
+
+    def __init__(self, node: SuiteNode, length: int) -> None:
+        """Begin nothing yet."""
+        self._node, self._length, self._waits = node, length, False
+        self._work: tuple[Generator[None, None, Any], Use] | None = None
+
+    def begin(self, work: Generator[None, None, Any], use: Use) -> None:
+        """Begin some work, and use what it returns."""
+        self._work = work, use
+        if self._node.lock_step or self._node.executor is None:
+            while self._work is not None:
+                self._go_on()
+        elif not self._waits:
+            self._later()
+
+    def _later(self) -> None:
+        executor = self._node.executor
+        self._waits = executor is not None  # else the node has ended
+        if executor is not None:
+            executor.create_task(self._node.guarded('between ticks', self._slice))
+
+    def _slice(self) -> None:
+        self._waits = False
+        self._go_on()
+        if self._work is not None and not self._waits:
+            self._later()
+
+    def _go_on(self) -> None:
+        if self._work is None:
+            return
+        work, use = self._work
+        try:
+            for _ in range(self._length):
+                next(work)
+        except StopIteration as end:
+            self._work = None
+            use(end.value)
+
+
 def main() -> None:
     """Compute what comes on standard input until it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for whoever asks
@@ -170,6 +220,12 @@ class Later:
     def __init__(self) -> None:
         """Wait for both the response and where it goes."""
         self._send: Callable[[Any], None] | None = None
+        self._make: Callable[[Any], Any] | None = None
+
+    def made_by(self, make: Callable[[Any], Any]) -> Later:
+        """Make the response of what is delivered."""
+        self._make = make
+        return self
 
     def bound_for(self, send: Callable[[Any], None]) -> None:
         """Take note of what sends the response."""
@@ -178,7 +234,7 @@ class Later:
     def deliver(self, response: Any) -> None:
         """Send the response."""
         if self._send is not None:
-            self._send(response)
+            self._send(response if self._make is None else self._make(response))
 
 
 def sends_later(service: Any) -> None:
