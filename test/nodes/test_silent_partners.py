@@ -132,6 +132,58 @@ def test_a_change_in_a_stop_changes_what_is_promised_of_it(ros: Ros, values: dic
     node.destroy_node()
 
 
+class Tasks:
+    """An executor that runs its tasks when it is told to."""
+
+    def __init__(self, node: InhibitionNode, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.waiting: list[Any] = []
+        monkeypatch.setattr(type(node), 'executor', property(lambda _: self))
+
+    def create_task(self, task: Any) -> None:
+        self.waiting.append(task)
+
+    def wake(self) -> None:
+        """Nothing waits."""
+
+    def run(self) -> int:
+        count = 0
+        while self.waiting:
+            self.waiting.pop(0)()
+            count += 1
+        return count
+
+
+def test_a_prediction_is_made_between_ticks_and_is_the_one_that_is_made_at_once(
+        ros: Ros, monkeypatch: pytest.MonkeyPatch) -> None:
+    node, _ = watching(ros, KNOWN)
+    expected = node._take_request(SetBool.Request(data=True))
+    node.destroy_node()
+    node, _ = watching(ros, KNOWN)
+    _, state, tick = walked(300)
+    tasks, answers = Tasks(node, monkeypatch), []
+    node._take_request(SetBool.Request(data=True)).bound_for(answers.append)
+    assert node._acting.requested and not answers
+    assert np.isnan(node._promise.predicted_s) and np.isfinite(node._promise.bound_s)
+    tasks.waiting.pop(0)()
+    tick_at(node, state, tick, PATIENT_NS + TICK)            # a tick comes meanwhile
+    assert tasks.run() > 10
+    assert answers == [expected]
+    node.destroy_node()
+
+
+def test_requests_that_overtake_a_prediction_are_all_answered(
+        ros: Ros, monkeypatch: pytest.MonkeyPatch) -> None:
+    node, _ = watching(ros, KNOWN)
+    tasks, answers = Tasks(node, monkeypatch), []
+    for stop in (True, False, True):
+        node._take_request(SetBool.Request(data=stop)).bound_for(answers.append)
+    tasks.run()
+    assert ['another request' in what for _, what in answers] == [False, True, False]
+    assert all(accepted for accepted, _ in answers)
+    assert 'at rest in' in answers[0][1] and answers[0] == answers[2]
+    node.destroy_node()
+
+
 def test_a_restarted_node_keeps_a_stop_and_does_not_stop_a_gait(ros: Ros) -> None:
     for acting in (RUNS, STOPPED):
         node, _ = watching(ros, ('acting_gains', 1_000_000_000, acting))
