@@ -164,6 +164,28 @@ def gaits(results: Any) -> str:
             f'{digits}·10{sign} rad')
 
 
+def any_command(results: Any) -> str:
+    """Of ``random_commands``."""
+    count, _, fell, stops, late, stepped, _ = commanded(results)
+    kept = 'as predicted and within their bounds' if not late else f'of which {late} were late'
+    return (f'{count} walks of 60 s under random commands, gaits and stops on seeds nothing was '
+            f'tuned on: {fell or "none"} fell, {stops:,} stops {kept}, {stepped} more stepped '
+            'out of; without governor and caution, on other seeds, 8 of 12 walks fell')
+
+
+def commanded(results: Any) -> tuple[int, ...]:
+    """Walks, their time [s], falls, stops to rest, those of them that were late, stops that the
+    robot stepped out of, and the share of what was asked that was granted [%].
+    """
+    stops = [stop for one in results for stop in one['stops']]
+    late = [gait for gait, predicted, bound, took in stops
+            if took > bound + 1e-9 or abs(took - predicted) > 1e-9]
+    share = sum(one['granted'] for one in results) / sum(one['asked'] for one in results)
+    return (len(results), round(sum(one['seconds'] for one in results)),
+            sum(bool(one['fell']) for one in results), len(stops), len(late),
+            sum(one['stepped'] for one in results), round(100.0 * share))
+
+
 def rough(results: Any) -> str:
     """Of ``benchmark_walking --tables rough``."""
     shares = [share for of in crossings(results).values() for share in of]
@@ -287,6 +309,14 @@ def speed_rows(results: Any) -> list[str]:
     return rows
 
 
+def command_rows(results: Any) -> list[str]:
+    """Row of the table of random commands."""
+    count, seconds, fell, stops, late, stepped, granted = commanded(results)
+    first, last = (of(one['seed'] for one in results) for of in (min, max))
+    return [f'(`--runs {count} --seed {first}`) | {first} to {last}, nothing tuned on | {count} | '
+            f'{seconds} | {fell} | {stops}, and {stepped} stepped out | {late} | {granted} % |']
+
+
 def rough_rows(results: Any) -> list[str]:
     """Rows of the table of rough ground: a gait, and its share on every ground."""
     return [' | '.join((f'| {gait}', *(f'{share:.0f} %' for share in shares))) + ' |'
@@ -363,6 +393,7 @@ STUDIES = {
     'the-experiment': Study(experiment, experiment_rows),
     'speeds': Study(speeds, speed_rows), 'changes-of-gait': Study(gaits, gait_rows),
     'rough-ground': Study(rough, rough_rows),
+    'any-command': Study(any_command, command_rows, 'doc/walking.md'),
     'stairs-what-one-foot-felt-all-know': Study(stairs, stair_rows, 'doc/walking.md'),
     'tightness-of-the-certificates': Study(tightness, tightness_rows),
     'falls': Study(falls, fall_rows), 'stops-at-every-phase': Study(stops, stop_rows),
