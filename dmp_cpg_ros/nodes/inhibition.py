@@ -362,8 +362,7 @@ class InhibitionNode(SuiteNode):
         """Look ahead to the rest or the walk that was requested, just now or before parameters
         have changed; the bound is known at once.
         """
-        state = self._state
-        present = self._network.gait
+        state, present = self._state, self._network.gait
         wanted = self.certified.wanted or self.certified.gaits.named(present.ends[-1].name)
         canon = CanonicalState(present, wanted, self._slow.gait.cadence_scale,
                                self._x, self._x_dot, initial_contact_state())
@@ -371,39 +370,40 @@ class InhibitionNode(SuiteNode):
         self._foreseen = command = self._gate.foreseen(state.time_ns + tick_ns)
         gait = next_gait(self._reference, self._running_gait, self._acting, canon, self._r,
                          command, tick_ns * 1e-9)
-        running = self.certified.running_in(gait)
-        way = running.stop_distance(self._r, command) if state.requested else nan
-        if state.requested and state.voted:
-            bound = self._bound_by_votes()
-        elif state.requested:
-            bound = running.time_to_rest(self._slow, self._x, self._r, state.quickness)
-        else:
-            bound = self.certified.certificate_in(gait).time_to_walking
-        self._due_ns = state.time_ns + 1e9 * bound if (
-            state.requested and isfinite(bound)) else inf
-        promise, self._promised_for = Promise(nan, bound, way), running
-        if isfinite(state.measured_s):  # released by a push in full swing: it runs already
-            promise = promise._replace(predicted_s=state.measured_s)
         since_s, before_m = 1e-9 * (state.time_ns - state.request_ns), self._promise.bound_m
-        later = not isfinite(state.measured_s) and since_s > 0.0
+        if since_s <= 0.0 or isfinite(state.measured_s):  # pushed in full swing, it runs already
+            since_s = before_m = 0.0
+        bounded = self._bounded(gait, command).told_later(since_s, before_m)
 
         def known(outlook: Outlook) -> None:
-            told = promise._replace(outlook=outlook)
-            if not isfinite(state.measured_s):
-                told = told._replace(predicted_s=outlook.time_s)
+            self._promise = bounded.foreseen(outlook, since_s)
             if not (state.requested or isfinite(outlook.time_s)):
-                told = told._replace(bound_s=inf)
-            self._promise = told.told_later(since_s, before_m) if later else told
+                self._promise = self._promise._replace(bound_s=inf)
             answers, self._answers = self._answers, []
             for stop, answer in answers:
                 answer.deliver(self._answer(stop))
             if self.active and not self.lock_step and self._news() != self._told:
                 self._publish()
 
-        self._promise = promise.told_later(since_s, before_m) if later else promise
+        self._promise = bounded
         self._slices.begin(looking_ahead(
             self._supervisor, self._reference, self._running_gait, state, self._acting,
             canon, self._r, command, tick_ns * 1e-9, body_mode=self._barring), known)
+
+    def _bounded(self, gait: GaitInForce, command: tuple[float, float, float]) -> Promise:
+        """What is certain of a request that acts in a gait, from now on."""
+        state = self._state
+        self._promised_for = running = self.certified.running_in(gait)
+        self._due_ns, way = inf, nan
+        if not state.requested:
+            bound = self.certified.certificate_in(gait).time_to_walking
+        else:
+            way = running.stop_distance(self._r, command)
+            bound = self._bound_by_votes() if state.voted else running.time_to_rest(
+                self._slow, self._x, self._r, state.quickness)
+            if isfinite(bound):
+                self._due_ns = state.time_ns + 1e9 * bound
+        return Promise(state.measured_s, bound, way)
 
     def _bound_by_votes(self) -> float:
         """Bound on the time from now to rest under the votes [s]."""

@@ -36,12 +36,19 @@ class Promise(NamedTuple):
         return self.outlook.stands_s if self.outlook else nan
 
     def told_later(self, since_s: float, before_m: float) -> Promise:
-        """The same when the request is some time ago [s], since when the reference has gone no
-        farther than was promised then [m].
+        """The same bounds when the request is some time ago [s], since when the reference has
+        gone no farther than was promised then [m].
         """
-        outlook = self.outlook and self.outlook._replace(down_s=self.outlook.down_s + since_s)
-        return Promise(self.predicted_s + since_s, self.bound_s + since_s,
-                       self.bound_m + before_m, outlook)
+        return Promise(self.predicted_s + since_s, self.bound_s + since_s, self.bound_m + before_m)
+
+    def foreseen(self, outlook: Outlook, since_s: float) -> Promise:
+        """The same with what is predicted, of a request that is some time ago [s]; what it has
+        taken stays where that is known.
+        """
+        known = isfinite(self.predicted_s)
+        return self._replace(
+            predicted_s=self.predicted_s if known else outlook.time_s + since_s,
+            outlook=outlook._replace(down_s=outlook.down_s + since_s))
 
     def words(self, stop: bool, certificate: str, push_recovery: bool) -> str:
         """Say it, with the certificate in a few words; and whether pushes begin the gait anew."""
