@@ -41,9 +41,13 @@ SHARING = {'each': 'ten processes', 'blocks': 'blocks', 'composed': 'composed'}
 
 RATE_HZ, TICK_NS, LEAST_CORES, MUJOCO = 250.0, 4_000_000, 0.005, 'mj_step'
 
-RECORDED_RATES, MOST_ROBOTS, FULL, CHANGES = (1, 4, 16), 16, 0.98, 50
+RECORDED_RATES, MOST_ROBOTS, FULL = (1, 4, 16), 16, 0.98
 """Rates of the recorder's row, as multiples; number of robots, and real-time factor, at which no
-further robot is tried; how many changes are asked for."""
+further robot is tried.
+"""
+
+CHANGES, REQUESTS = 50, 24
+"""How many changes, and stops and starts, are asked for."""
 
 BEGIN, END = '<!-- make bench-ros: begin -->', '<!-- make bench-ros: end -->'
 """Where the document has the table."""
@@ -271,6 +275,16 @@ class Bench:
                 yield Figure(f'{SHARING[way]}: period while one is judged, {percent:g} %', 'ms',
                              busy, quiet, 'else')
 
+    def requests(self) -> Iterator[Figure]:
+        """Stops and starts in real time: by how much a prediction is missed."""
+        for way in self.ways:
+            _say(f'{SHARING[way]}: {REQUESTS} requests')
+            late = np.abs(bench_runs.kept_predictions(
+                way, self._folder / f'requests_{way}', REQUESTS))
+            for word, of in (('median', np.median), ('largest', np.max)):
+                yield Figure(f'{SHARING[way]}: {len(late)} predictions, error, {word}', 'ms',
+                             1e3 * float(of(late)), 1e-6 * TICK_NS, 'a tick')
+
     def robots(self) -> Iterator[Figure]:
         """Composed suites in namespaces, until one does not keep real time."""
         one: Sequence[Run] = ()
@@ -305,7 +319,7 @@ SHORT = ('startup', 'latency', 'cpu', 'wakeups', 'memory', 'jitter', 'lockstep',
          'recorder')
 """Rows that are measured where none are named; the first share their runs."""
 
-ROWS = (*SHORT, 'analyze', 'robots', 'changes')
+ROWS = (*SHORT, 'analyze', 'robots', 'changes', 'requests')
 """Rows, each a method of :class:`Bench`."""
 
 
@@ -316,7 +330,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.set_defaults(json=Path('bench_ros.json'))
     add = parser.add_argument
     add('--rows', nargs='+', choices=ROWS, default=SHORT, metavar='ROW',
-        help=f'rows to measure: {", ".join(ROWS)} (default: all but the last three)')
+        help=f'rows to measure: {", ".join(ROWS)} (default: all but the last four)')
     add('--ways', nargs='+', choices=SHARING, default=list(SHARING), metavar='WAY',
         help=f'how processes are shared: {", ".join(SHARING)} (default: all)')
     add('--seconds', type=float, default=10.0, help='length of every window (default: 10)')

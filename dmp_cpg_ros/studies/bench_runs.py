@@ -30,6 +30,9 @@ SETTLE_S = 1.0
 FLAGS = {'each': (), 'blocks': ('--processes', 'blocks'), 'composed': ('--composed',)}
 """Arguments of ``walk`` by how processes are shared."""
 
+APART_S = 2.31
+"""Time between two requests [s]."""
+
 COMPETITOR = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent: pass'
 """A busy loop that ends with its parent."""
 
@@ -154,6 +157,31 @@ def run_suite(way: str, folder: Path, seconds: float, lock_step: bool = False,
     run.reached_s['active'] = max(active, default=begin_s) - begin_s
     run.read(_reports(folder / 'run'), walking_s + SETTLE_S)
     return run
+
+
+def kept_predictions(way: str, folder: Path, requests: int) -> list[float]:
+    """Stop and start a walk in turn at other phases each time; how much longer than predicted it
+    took to rest or to walk [s].
+
+    Raises
+    ------
+    DmpCpgError
+        If the suite does not do what it is asked for.
+    """
+    times = [3.0 + k * APART_S for k in range(requests)]
+    walk = WalkProcess.of(
+        folder, times[-1] + APART_S,
+        [*ahead(), *({'at': at, 'inhibit': k % 2 == 0} for k, at in enumerate(times))],
+        *FLAGS[way])
+    try:
+        walk.process.wait(WITHIN_S + 3.0 * times[-1])
+        metrics = json.loads((folder / 'run' / 'metrics.json').read_text(encoding='utf-8'))
+    except (subprocess.TimeoutExpired, OSError):
+        raise walk.failure() from None
+    finally:
+        walk.end()
+    return [one['measured_s'] - one['predicted_s'] for what in ('stop', 'start')
+            for one in metrics[what]['all'] if one['measured_s'] is not None]
 
 
 def _reports(run: Path) -> Reports:

@@ -116,6 +116,7 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
     events = course(seed, seconds, limits, gaits)
     foot_speed = loop.canonical.scale.foot_speed
     for k in range(round(seconds / run.tick_s)):
+        stops = False
         while events and events[0][0] <= k * run.tick_s:
             _, what, value = events.pop(0)
             if what == 'command':
@@ -123,12 +124,11 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
                 loop.command(*asked)
             elif what == 'gait':
                 loop.change_gait(value)
-            elif value:
-                bound = loop.time_to_rest()
-                open_stop = loop.canon.gait.name, loop.request(True), bound
             else:
-                open_stop = None
-                loop.request(False)
+                stops, open_stop = value, None
+                loop.request(value)
+        if stops:  # what comes within the tick of a request acts when it does
+            open_stop = loop.canon.gait.name, loop.request(True), loop.time_to_rest()
         run.tick(run.tick_s)
         run.states.clear()
         outcome.seconds += run.tick_s
