@@ -62,6 +62,9 @@ HEARTBEAT_NS = 100_000_000
 JOIN_EVERY_S = 0.1
 """In lock-step, how often a restarted node looks whether it has been told what acts [s]."""
 
+OVERTAKEN = 'done; another request came before it was predicted'
+"""Answer to a request that was no longer in force when it had been predicted."""
+
 PREDICTED_AT_ONCE = 10
 """Ticks ahead that are computed between two callbacks: about 1 ms."""
 
@@ -95,7 +98,7 @@ class InhibitionNode(SuiteNode):
         self._promise, self._promised_for = Promise(), self._running
         self._foreseen, self._anew = (0.0, 0.0, 0.0), False
         self._slices = Slices(self, PREDICTED_AT_ONCE)
-        self._answers: list[tuple[bool, Later]] = []
+        self._answer: tuple[bool, Later] | None = None
         self._due_ns, self._told_ns, self._blind = inf, -HEARTBEAT_NS, ''
         self._drive, self._joined, self._asked = FOLLOWING, False, False
         self._began_ns = -1
@@ -341,15 +344,17 @@ class InhibitionNode(SuiteNode):
         if not self.lock_step:  # what it takes to predict must not delay it
             self._acting = self._supervisor.inhibition(self._state)
             self._publish_gains()
+        if self._answer is not None:
+            self._answer[1].deliver((True, OVERTAKEN))
         answer = Later()
-        self._answers = [*self._answers, (stop, answer)]
+        self._answer = stop, answer
         self._predict()
-        return self._answer(stop) if not self._answers else answer
+        return self._told_of(stop) if self._answer is None else answer
 
-    def _answer(self, stop: bool) -> tuple[bool, str]:
+    def _told_of(self, stop: bool) -> tuple[bool, str]:
         """What a request is answered once it has been predicted."""
         if stop != self._state.in_force:
-            return True, 'another request came before it was predicted'
+            return True, OVERTAKEN
         return True, self._promise.words(
             stop, self._words(), self._supervisor.parameters.push_recovery)
 
@@ -379,9 +384,9 @@ class InhibitionNode(SuiteNode):
             self._promise = bounded.foreseen(outlook, since_s)
             if not (state.requested or isfinite(outlook.time_s)):
                 self._promise = self._promise._replace(bound_s=inf)
-            answers, self._answers = self._answers, []
-            for stop, answer in answers:
-                answer.deliver(self._answer(stop))
+            if self._answer is not None:
+                (stop, answer), self._answer = self._answer, None
+                answer.deliver(self._told_of(stop))
             if self.active and not self.lock_step and self._news() != self._told:
                 self._publish()
 
