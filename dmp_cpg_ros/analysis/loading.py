@@ -266,8 +266,11 @@ def _by_name(statuses: Statuses) -> dict[str, tuple[StatusEvent, ...]]:
 
 def _changes(statuses: Statuses, what: Callable[[StatusEvent], Any],
              ) -> tuple[StatusEvent, ...]:
-    """The first of the events in a row that say the same."""
-    return tuple(next(same) for _, same in groupby((event for _, event in statuses), what))
+    """The first of the events in a row that say the same, in the order of their stamps: a recorder
+    that joins gets what a latched topic has told before after what it tells then.
+    """
+    events = sorted((event for _, event in statuses), key=lambda event: event.time)
+    return tuple(next(same) for _, same in groupby(events, what))
 
 
 def _modes(topics: Mapping[str, Topic]) -> tuple[StatusEvent, ...]:

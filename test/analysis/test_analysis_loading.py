@@ -174,6 +174,21 @@ def test_repeated_inhibition_states_are_one_event(tmp_path: Path) -> None:
     ]
 
 
+def test_a_state_that_was_told_before_the_recorder_joined_comes_first(tmp_path: Path) -> None:
+    with Writer(tmp_path / 'bag', version=9) as writer:
+        connection = writer.add_connection(
+            '/inhibition_state', 'diagnostic_msgs/msg/DiagnosticArray', typestore=STORE)
+        for at, (second, word) in enumerate(((1, 'releasing'), (0, 'at_rest'), (2, 'walking'))):
+            message = make('diagnostic_msgs/msg/DiagnosticArray', header=make(
+                'std_msgs/msg/Header', frame_id='', stamp=make(
+                    'builtin_interfaces/msg/Time', sec=second, nanosec=0)),
+                status=[make('diagnostic_msgs/msg/DiagnosticStatus', level=0, name='inhibition',
+                             message=word, hardware_id='', values=[])])
+            writer.write(connection, at + 1, STORE.serialize_cdr(message, connection.msgtype))
+    loaded = load_recording(tmp_path / 'bag')
+    assert [event.message for event in loaded.inhibition] == ['at_rest', 'releasing', 'walking']
+
+
 def test_a_bag_without_our_topics_is_an_empty_recording(tmp_path: Path) -> None:
     with Writer(tmp_path / 'bag', version=9) as writer:
         connection = writer.add_connection('/chatter', 'std_msgs/msg/String', typestore=STORE)
