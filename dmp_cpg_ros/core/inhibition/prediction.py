@@ -79,10 +79,10 @@ class Outlook(NamedTuple):
 
 
 def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
-               state: SupervisorState, published: Inhibition, canon: CanonicalState, r: Array,
-               command: tuple[float, float, float], dt: float, horizon: float = 10.0,
-               body_mode: str = 'standing') -> Generator[None, None, Outlook]:
-    """Run ahead from a request, a tick at a time, to be returned what becomes of it.
+                  state: SupervisorState, published: Inhibition, canon: CanonicalState, r: Array,
+                  command: tuple[float, float, float], dt: float, horizon: float = 10.0,
+                  body_mode: str = 'standing') -> Generator[None, None, Outlook]:
+    """Run ahead from a request; every step of the generator is a tick of what is looked ahead.
 
     Parameters
     ----------
@@ -102,6 +102,11 @@ def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canoni
         Tick, and longest time that is looked ahead [s].
     body_mode : str
         What the body does, assumed to stay.
+
+    Returns
+    -------
+    Outlook
+        At the end.
     """
     down_s, way_m, speed, stop = 0.0, 0.0, hypot(r[0], r[1]), state.requested
     ticks = ticks_ahead(supervisor, reference, canonical, state, published, canon, r, command, dt,
