@@ -7,42 +7,31 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import replace
-from math import inf, isfinite, nan
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
-from dmp_cpg_ros.core.certificates import gate
-from dmp_cpg_ros.core.certificates.network import Setting
-from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.gait.contact_feedback import initial_contact_state
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import CanonicalState
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.handover import adopted
-from dmp_cpg_ros.core.inhibition.prediction import Outlook, looking_ahead, next_gait
-from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.suite_parameters import (
-    INHIBITION,
-    VOTE_SOURCES,
-    SuiteParameters,
-    TickParameters,
-)
-from dmp_cpg_ros.core.transformation.leg import LegParameters
+from dmp_cpg_ros.core.suite_parameters import INHIBITION, VOTE_SOURCES, TickParameters
 from dmp_cpg_ros.core.voting.parameters import VoteSourceParameters, VotingParameters
 from dmp_cpg_ros.core.voting.voters import VoteSensors
 from dmp_cpg_ros.core.voting.votes import VoteInbox
 from dmp_cpg_ros.core.voting.voting import Voting
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
-from dmp_cpg_ros.nodes.framework.judging import Later, Slices
+from dmp_cpg_ros.nodes.framework.judging import Later
 from dmp_cpg_ros.nodes.framework.known_stop import OthersKnow
-from dmp_cpg_ros.nodes.framework.promise import Promise
+from dmp_cpg_ros.nodes.framework.promise import Present, Promises
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader, GaitMemoryWriter
 from dmp_cpg_ros.nodes.messages.commands import read_votes
@@ -65,8 +54,8 @@ JOIN_EVERY_S = 0.1
 OVERTAKEN = 'done; another request came before it was predicted'
 """Answer to a request that was no longer in force when it had been predicted."""
 
-PREDICTED_AT_ONCE = 10
-"""Ticks ahead that are computed between two callbacks: about 1 ms."""
+UNKNOWN = 'done; it could not be predicted'
+"""Begin of the answer to a request of which no time can be said."""
 
 BLIND_NS = 250_000_000
 """Time on the robot's clock without a tick after which nothing is known of the gait [ns]."""
@@ -95,11 +84,9 @@ class InhibitionNode(SuiteNode):
         self._x: Any = None
         self._x_dot: Any = None
         self._r, self._body_mode = np.zeros(3), 'standing'
-        self._promise, self._promised_for = Promise(), self._running
-        self._foreseen, self._anew = (0.0, 0.0, 0.0), False
-        self._slices = Slices(self, PREDICTED_AT_ONCE)
+        self._promises, self._anew = Promises(self, self.certified, self._network.gait), False
         self._answer: tuple[bool, Later] | None = None
-        self._due_ns, self._told_ns, self._blind = inf, -HEARTBEAT_NS, ''
+        self._told_ns, self._blind = -HEARTBEAT_NS, ''
         self._drive, self._joined, self._asked = FOLLOWING, False, False
         self._began_ns = -1
         self._held: tuple[int, dict[str, Any]] | None = None
@@ -138,8 +125,9 @@ class InhibitionNode(SuiteNode):
         self._slow = self._unhurried(self._network.gait)
         self.certified.limit(self._gate)
         # until a request acts a change of gait may begin, of which no inequality depends
+        self._promises.take_over_parameters()
         self._anew |= self._state.time_ns == self._state.request_ns or not (
-            gate.UNCERTIFIED.issuperset(self._running.differences(self._promised_for)))
+            self._promises.holds_with(self.certified.running_in(self._network.gait)))
 
     def _build(self) -> None:
         of = self.parameters_of
@@ -167,7 +155,8 @@ class InhibitionNode(SuiteNode):
             before, stamp_ns, network, self._x, self._x_dot, self._r, self._gate.at(stamp_ns),
             self._votes.tally, self._barring, margins, progress, self.certified.wanted)
         self._acting = self._supervisor.inhibition(self._state)
-        self._due_ns += min(0, stamp_ns - before.time_ns)  # it goes with a clock that is set back
+        # it goes with a clock that is set back
+        self._promises.due_ns += min(0, stamp_ns - before.time_ns)
         self._tell_block(before)
         balance = (self._state.share, self._state.quickness)
         if (self._news() != self._told or self.lock_step
@@ -192,7 +181,7 @@ class InhibitionNode(SuiteNode):
         """
         state, anew, self._anew = self._state, self._anew, False
         overtaken = state.requested and before.time_ns == before.request_ns and (
-            self._gate.foreseen(state.time_ns) != self._foreseen)
+            self._gate.foreseen(state.time_ns) != self._promises.command)
         if state.requested != before.requested or (
                 (anew or overtaken) and not isfinite(state.measured_s)):
             self._predict()
@@ -289,11 +278,11 @@ class InhibitionNode(SuiteNode):
     def _watch_bound(self, now_ns: int) -> None:
         """Report a stop that takes longer than was promised."""
         if not self._state.requested or isfinite(self._state.measured_s):
-            self._due_ns = inf
+            self._promises.due_ns = inf
             self.clear('bound')
-        elif now_ns > self._due_ns:
-            self.warn('bound', f'the gait was to rest by {self._due_ns * 1e-9:.3f} s and does not',
-                      error=True)
+        elif now_ns > self._promises.due_ns:
+            self.warn('bound', f'the gait was to rest by {self._promises.due_ns * 1e-9:.3f} s '
+                      'and does not', error=True)
 
     def _acting_now(self) -> Acting:
         if self._x is None:
@@ -355,69 +344,30 @@ class InhibitionNode(SuiteNode):
         """What a request is answered once it has been predicted."""
         if stop != self._state.in_force:
             return True, OVERTAKEN
-        return True, self._promise.words(
+        return True, self._promises.latest.words(
             stop, self._words(), self._supervisor.parameters.push_recovery)
 
-    @property
-    def _running(self) -> gate.Running:
-        """What runs in the gait in force, or in the change between two."""
-        return self.certified.running_in(self._network.gait)
-
     def _predict(self) -> None:
-        """Look ahead to the rest or the walk that was requested, just now or before parameters
-        have changed; the bound is known at once.
+        """Promise the rest or the walk that was requested, just now or before parameters have
+        changed, and answer the request once it has been predicted.
         """
         state, present = self._state, self._network.gait
         wanted = self.certified.wanted or self.certified.gaits.named(present.ends[-1].name)
-        canon = CanonicalState(present, wanted, self._slow.gait.cadence_scale,
-                               self._x, self._x_dot, initial_contact_state())
         tick_ns = self.parameters_of(TickParameters).tick_ns
-        self._foreseen = command = self._gate.foreseen(state.time_ns + tick_ns)
-        gait = next_gait(self._reference, self._running_gait, self._acting, canon, self._r,
-                         command, tick_ns * 1e-9)
-        since_s, before_m = 1e-9 * (state.time_ns - state.request_ns), self._promise.bound_m
-        if since_s <= 0.0 or isfinite(state.measured_s):  # pushed in full swing, it runs already
-            since_s = before_m = 0.0
-        bounded = self._bounded(gait, command).told_later(since_s, before_m)
 
-        def known(outlook: Outlook) -> None:
-            self._promise = bounded.foreseen(outlook, since_s)
-            if not (state.requested or isfinite(outlook.time_s)):
-                self._promise = self._promise._replace(bound_s=inf)
+        def known(error: Exception | None) -> None:
             if self._answer is not None:
                 (stop, answer), self._answer = self._answer, None
-                answer.deliver(self._told_of(stop))
+                answer.deliver(
+                    self._told_of(stop) if error is None else (True, f'{UNKNOWN}: {error}'))
             if self.active and not self.lock_step and self._news() != self._told:
                 self._publish()
 
-        self._promise = bounded
-        self._slices.begin(looking_ahead(
-            self._supervisor, self._reference, self._running_gait, state, self._acting,
-            canon, self._r, command, tick_ns * 1e-9, body_mode=self._barring), known)
-
-    def _bounded(self, gait: GaitInForce, command: tuple[float, float, float]) -> Promise:
-        """What is certain of a request that acts in a gait, from now on."""
-        state = self._state
-        self._promised_for = running = self.certified.running_in(gait)
-        self._due_ns, way = inf, nan
-        if not state.requested:
-            bound = self.certified.certificate_in(gait).time_to_walking
-        else:
-            way = running.stop_distance(self._r, command)
-            bound = self._bound_by_votes() if state.voted else running.time_to_rest(
-                self._slow, self._x, self._r, state.quickness)
-            if isfinite(bound):
-                self._due_ns = state.time_ns + 1e9 * bound
-        return Promise(state.measured_s, bound, way)
-
-    def _bound_by_votes(self) -> float:
-        """Bound on the time from now to rest under the votes [s]."""
-        of = self.parameters_of
-        suite = SuiteParameters(reference=of(ReferenceParameters), leg=of(LegParameters),
-                                inhibition=self._supervisor.parameters)
-        armed = self._supervisor.inhibition(replace(self._state, armed=True))
-        return time_to_slow(armed.quickness) + vote_bound(Setting.of(
-            self._slow, suite, of(TickParameters).tick_ns * 1e-9), armed.gains)
+        canonical = CanonicalState(present, wanted, self._slow.gait.cadence_scale, self._x,
+                                   self._x_dot, initial_contact_state())
+        self._promises.make(Present(
+            state, self._acting, canonical, self._slow, self._r,
+            self._gate.foreseen(state.time_ns + tick_ns), self._barring), known)
 
     # What is told ------------------------------------------------------------------------------
 
@@ -429,7 +379,7 @@ class InhibitionNode(SuiteNode):
         now = self._state
         return (now.state, now.requested, now.armed, now.automatic, now.request_ns, now.voted,
                 now.tally.causes, now.tally.weights.tobytes(), now.leg, now.rest_phase,
-                now.block.acts, self._promise)
+                now.block.acts, self._promises.latest)
 
     def _publish_gains(self) -> None:
         self._told_ns = self._state.time_ns
@@ -437,7 +387,7 @@ class InhibitionNode(SuiteNode):
 
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()
-        promise = self._promise
+        promise = self._promises.latest
         told = {'requested': state.in_force, 'armed': state.armed, 'automatic': state.automatic,
                 'pushed': state.push.acts, 'blocked': state.block.acts,
                 **_by_leg('gain', acting.gains), 'region_radius': acting.region_radius,

@@ -110,7 +110,7 @@ def test_a_stop_for_a_drive_that_looks_after_itself_is_predicted_whatever_is_com
         node._gate.accept(0.5, 0.0, 0.0)
         stops(node)
         assert node._state.requested
-        predicted.append(node._promise.predicted_s)
+        predicted.append(node._promises.latest.predicted_s)
         node.destroy_node()
     assert abs(predicted[0] - predicted[1]) < 1.5e-9 * TICK  # which acts at once
 
@@ -121,14 +121,14 @@ def test_a_change_in_a_stop_changes_what_is_promised_of_it(ros: Ros, values: dic
     node, now = watching(ros, KNOWN)
     node._r = np.array([0.5, 0.0, 0.0])
     assert node._take_request(SetBool.Request(data=True))[0]
-    told, due = node._promise, node._due_ns
+    told, due = node._promises.latest, node._promises.due_ns
     node.health.stamp_ns = node._state.time_ns
     node.parameter_changes.follow(values)
     node.take_parameters()
-    assert node._promise is told  # what it takes to predict must not delay a tick
+    assert node._promises.latest is told  # what it takes to predict must not delay a tick
     node._predict_what_is_new(node._state)
-    later = node._promise.predicted_s > told.predicted_s and node._due_ns > due
-    assert later == ('alpha_r' in values) and (later or node._promise == told)
+    later = node._promises.latest.predicted_s > told.predicted_s and node._promises.due_ns > due
+    assert later == ('alpha_r' in values) and (later or node._promises.latest == told)
     node.destroy_node()
 
 
@@ -163,11 +163,33 @@ def test_a_prediction_is_made_between_ticks_and_is_the_one_that_is_made_at_once(
     tasks, answers = Tasks(node, monkeypatch), []
     node._take_request(SetBool.Request(data=True)).bound_for(answers.append)
     assert node._acting.requested and not answers
-    assert np.isnan(node._promise.predicted_s) and np.isfinite(node._promise.bound_s)
+    promise = node._promises.latest
+    assert np.isnan(promise.predicted_s) and np.isfinite(promise.bound_s)
     tasks.waiting.pop(0)()
     tick_at(node, state, tick, PATIENT_NS + TICK)            # a tick comes meanwhile
     assert tasks.run() > 10
     assert answers == [expected]
+    node.destroy_node()
+
+
+def test_a_request_is_answered_where_it_cannot_be_predicted(
+        ros: Ros, monkeypatch: pytest.MonkeyPatch) -> None:
+    def raising(*_: Any, **__: Any) -> Any:
+        yield
+        raise FloatingPointError('overflow')
+
+    node, _ = watching(ros, KNOWN)
+    tasks, answers = Tasks(node, monkeypatch), []
+    with monkeypatch.context() as patch:
+        patch.setattr('dmp_cpg_ros.nodes.framework.promise.looking_ahead', raising)
+        node._take_request(SetBool.Request(data=True)).bound_for(answers.append)
+        tasks.run()
+    ((done, words),) = answers
+    assert done and words == 'done; it could not be predicted: overflow'
+    assert node._state.requested and np.isfinite(node._promises.latest.bound_s)
+    node._take_request(SetBool.Request(data=False)).bound_for(answers.append)
+    tasks.run()
+    assert answers[-1][0] and 'walking in' in answers[-1][1]  # the next one is predicted again
     node.destroy_node()
 
 
@@ -308,7 +330,7 @@ def test_gains_of_before_a_clock_that_was_set_back_are_those_of_a_silent_inhibit
 def test_gains_and_promise_go_on_when_the_clock_is_set_back(ros: Ros) -> None:
     node, now = watching(ros, KNOWN)
     node._take_request(SetBool.Request(data=True))
-    due_s = 1e-9 * (node._due_ns - now)
+    due_s = 1e-9 * (node._promises.due_ns - now)
     told: list[Any] = []
     node._gains_publisher.publish = told.append  # type: ignore[method-assign]
     _, state, tick = walked(300)
@@ -316,7 +338,7 @@ def test_gains_and_promise_go_on_when_the_clock_is_set_back(ros: Ros) -> None:
         tick_at(node, state, tick, k * TICK)
     passed = 59 * TICK // HEARTBEAT_NS
     assert len(told) > passed >= 2
-    assert 1e-9 * (node._due_ns - state.time_ns - TICK) == pytest.approx(due_s)
+    assert 1e-9 * (node._promises.due_ns - state.time_ns - TICK) == pytest.approx(due_s)
     node.destroy_node()
 
 

@@ -148,7 +148,7 @@ class Slices:
         self._work: tuple[Generator[None, None, Any], Use] | None = None
 
     def begin(self, work: Generator[None, None, Any], use: Use) -> None:
-        """Begin some work, and use what it returns."""
+        """Begin some work, and use what it returns, or the :class:`Raised` that it ended with."""
         self._work = work, use
         if self._node.lock_step or self._node.executor is None:
             while self._work is not None:
@@ -175,9 +175,13 @@ class Slices:
         try:
             for _ in range(self._length):
                 next(work)
+            return
         except StopIteration as end:
-            self._work = None
-            use(end.value)
+            result = end.value
+        except Exception as error:  # noqa: BLE001 - whoever waits for the result has to know
+            result = Raised(error)
+        self._work = None
+        use(result)
 
 
 def main() -> None:

@@ -1,14 +1,36 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is promised of a stop or a start that was requested."""
+"""What is promised of a stop or a start that was requested, and how a node comes by it."""
 
 from __future__ import annotations
 
-from math import isfinite, nan
-from typing import NamedTuple
+from collections.abc import Callable
+from dataclasses import replace
+from math import inf, isfinite, nan
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from dmp_cpg_ros.core.inhibition.prediction import Outlook
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.certificates import gate
+from dmp_cpg_ros.core.certificates.network import Setting
+from dmp_cpg_ros.core.certificates.votes import vote_bound
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.running import CanonicalState
+from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.inhibition.prediction import Outlook, looking_ahead, next_gait
+from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
+from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.maths.rounding import exactly, no_less
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.suite_parameters import SuiteParameters, TickParameters
+from dmp_cpg_ros.core.transformation.leg import LegParameters
+from dmp_cpg_ros.nodes.framework.judging import Raised, Slices
+
+if TYPE_CHECKING:
+    from dmp_cpg_ros.nodes.framework.certified import Certified
+    from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+
+PREDICTED_AT_ONCE = 10
+"""Ticks ahead that are computed between two callbacks: about 1 ms."""
 
 
 class Promise(NamedTuple):
@@ -67,3 +89,133 @@ class Promise(NamedTuple):
             return ''
         return (f'; the body stands in about {of.stands_s:.2f} s, by trials within '
                 f'{no_less(of.stands_within_s, 2)} s and {no_less(of.stands_within_m, 2)} m')
+
+
+class Present(NamedTuple):
+    """What a request is predicted from.
+
+    Attributes
+    ----------
+    state : SupervisorState
+        The request included.
+    acting : Inhibition
+        What was published before the request, and still acts at the next tick.
+    canonical : CanonicalState
+        Of the oscillators.
+    slow : GaitNetwork
+        Their network at the cadence without the quickness that acts.
+    r : ndarray (3,)
+        The reference.
+    command : tuple of float
+        External command, assumed to stay (v_x, v_y, γ).
+    barring : str
+        What the body does, assumed to stay.
+    """
+
+    state: SupervisorState
+    acting: Inhibition
+    canonical: CanonicalState
+    slow: GaitNetwork
+    r: Any
+    command: tuple[float, float, float]
+    barring: str
+
+
+class Promises:
+    """Promises what a node is asked for: the bound is known at once, the prediction, which takes
+    several ticks, once it has been made between them.
+
+    Parameters
+    ----------
+    node : SuiteNode
+        Whose ticks do not wait.
+    certified : Certified
+        Its certificate, and the blocks that run.
+    gait : GaitInForce
+        That is walked now.
+
+    Attributes
+    ----------
+    latest : Promise
+        The last one.
+    due_ns : float
+        Until when a stop is to rest, on the robot's clock [ns]; infinite where there is no bound.
+    command : tuple of float
+        With which it was predicted.
+    """
+
+    def __init__(self, node: SuiteNode, certified: Certified, gait: GaitInForce) -> None:
+        """Promise nothing yet."""
+        self.latest, self.due_ns, self.command = Promise(), inf, (0.0, 0.0, 0.0)
+        self._node, self._certified = node, certified
+        self._slices = Slices(node, PREDICTED_AT_ONCE)
+        self._for = certified.running_in(gait)
+        self.take_over_parameters()
+
+    def take_over_parameters(self) -> None:
+        """Predict with the blocks as they run now."""
+        certified = self._certified
+        self._supervisor, self._reference = certified.supervisor(), certified.reference()
+        self._running_gait = certified.running_gait()
+        self._tick_ns = self._node.parameters_of(TickParameters).tick_ns
+
+    def holds_with(self, running: gate.Running) -> bool:
+        """Whether what runs now keeps what was promised."""
+        return gate.UNCERTIFIED.issuperset(running.differences(self._for))
+
+    def make(self, now: Present, known: Callable[[Exception | None], None]) -> None:
+        """Promise what has been requested, just now or before parameters have changed.
+
+        Parameters
+        ----------
+        now : Present
+            Where everything is.
+        known : callable (Exception or None)
+            Called once it is predicted, or with what was raised instead.
+        """
+        state, tick_s = now.state, self._tick_ns * 1e-9
+        self.command = now.command
+        gait = next_gait(self._reference, self._running_gait, now.acting, now.canonical, now.r,
+                         now.command, tick_s)
+        since_s, before_m = 1e-9 * (state.time_ns - state.request_ns), self.latest.bound_m
+        if since_s <= 0.0 or isfinite(state.measured_s):  # pushed in full swing, it runs already
+            since_s = before_m = 0.0
+        bounded = self._bounded(gait, now).told_later(since_s, before_m)
+
+        def predicted(outlook: Outlook | Raised) -> None:
+            if isinstance(outlook, Raised):
+                known(outlook.error)
+                raise outlook.error
+            self.latest = bounded.foreseen(outlook, since_s)
+            if not (state.requested or isfinite(outlook.time_s)):
+                self.latest = self.latest._replace(bound_s=inf)
+            known(None)
+
+        self.latest = bounded
+        self._slices.begin(looking_ahead(
+            self._supervisor, self._reference, self._running_gait, state, now.acting,
+            now.canonical, now.r, now.command, tick_s, body_mode=now.barring), predicted)
+
+    def _bounded(self, gait: GaitInForce, now: Present) -> Promise:
+        """What is certain of a request that acts in a gait, from now on."""
+        state = now.state
+        self._for = running = self._certified.running_in(gait)
+        self.due_ns, way = inf, nan
+        if not state.requested:
+            bound = self._certified.certificate_in(gait).time_to_walking
+        else:
+            way = running.stop_distance(now.r, now.command)
+            bound = self._bound_by_votes(now) if state.voted else running.time_to_rest(
+                now.slow, now.canonical.x, now.r, state.quickness)
+            if isfinite(bound):
+                self.due_ns = state.time_ns + 1e9 * bound
+        return Promise(state.measured_s, bound, way)
+
+    def _bound_by_votes(self, now: Present) -> float:
+        """Bound on the time from now to rest under the votes [s]."""
+        of = self._node.parameters_of
+        suite = SuiteParameters(reference=of(ReferenceParameters), leg=of(LegParameters),
+                                inhibition=self._supervisor.parameters)
+        armed = self._supervisor.inhibition(replace(now.state, armed=True))
+        return time_to_slow(armed.quickness) + vote_bound(
+            Setting.of(now.slow, suite, self._tick_ns * 1e-9), armed.gains)
