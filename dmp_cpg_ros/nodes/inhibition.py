@@ -338,7 +338,7 @@ class InhibitionNode(SuiteNode):
         answer = Later()
         self._answer = stop, answer
         self._predict()
-        return self._told_of(stop) if self._answer is None else answer
+        return answer.delivered or answer
 
     def _told_of(self, stop: bool) -> tuple[bool, str]:
         """What a request is answered once it has been predicted."""

@@ -187,9 +187,15 @@ def test_a_request_is_answered_where_it_cannot_be_predicted(
     ((done, words),) = answers
     assert done and words == 'done; it could not be predicted: overflow'
     assert node._state.requested and np.isfinite(node._promises.latest.bound_s)
+    assert node.health.rejected == {'prediction': 1}
     node._take_request(SetBool.Request(data=False)).bound_for(answers.append)
     tasks.run()
     assert answers[-1][0] and 'walking in' in answers[-1][1]  # the next one is predicted again
+    node.destroy_node()
+    monkeypatch.undo()  # without an executor, at once
+    node, _ = watching(ros, KNOWN)
+    monkeypatch.setattr('dmp_cpg_ros.nodes.framework.promise.looking_ahead', raising)
+    assert node._take_request(SetBool.Request(data=True)) == (done, words)
     node.destroy_node()
 
 

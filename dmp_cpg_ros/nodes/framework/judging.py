@@ -219,10 +219,17 @@ def attempted(compute: Compute) -> Any:
 
 
 class Later:
-    """Stands for the response of a service that is not there yet."""
+    """Stands for the response of a service that is not there yet.
+
+    Attributes
+    ----------
+    delivered : object
+        What was delivered before it was known where to; None before.
+    """
 
     def __init__(self) -> None:
         """Wait for both the response and where it goes."""
+        self.delivered: Any = None
         self._send: Callable[[Any], None] | None = None
         self._make: Callable[[Any], Any] | None = None
 
@@ -237,7 +244,9 @@ class Later:
 
     def deliver(self, response: Any) -> None:
         """Send the response."""
-        if self._send is not None:
+        if self._send is None:
+            self.delivered = response
+        else:
             self._send(response if self._make is None else self._make(response))
 
 

@@ -333,7 +333,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
         told = self.health.reject(name, reason + who, error=not expected)
         if not expected and kind not in self._traced:
             self._traced.add(kind)
-            self.get_logger().error(f'{name}: {traceback.format_exc()}')
+            self.get_logger().error(f'{name}: {"".join(traceback.format_exception(error))}')
         elif told:
             count = self.health.rejected[name]
             self.get_logger().warning(f'{name}: dropped: {reason}{who} ({count} dropped so far)')

@@ -184,8 +184,9 @@ class Promises:
 
         def predicted(outlook: Outlook | Raised) -> None:
             if isinstance(outlook, Raised):
+                self._node.drop('prediction', outlook.error)
                 known(outlook.error)
-                raise outlook.error
+                return
             self.latest = bounded.foreseen(outlook, since_s)
             if not (state.requested or isfinite(outlook.time_s)):
                 self.latest = self.latest._replace(bound_s=inf)
