@@ -20,7 +20,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import isfinite, nan, remainder, tau
 from pathlib import Path
 
@@ -30,7 +30,7 @@ import rclpy
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 from dmp_cpg_ros.studies.intruder_attacks import ATTACKS, LAST_S, NOTHING
 from dmp_cpg_ros.studies.intruder_node import Intruder
-from dmp_cpg_ros.studies.output import markdown_table
+from dmp_cpg_ros.studies.output import markdown_table, write_results
 from dmp_cpg_ros.studies.process_usage import children, resident_mb
 from dmp_cpg_ros.studies.walk_process import WITHIN_S, WalkProcess
 
@@ -147,6 +147,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--out', type=Path, metavar='DIR', help='keep the runs in an old folder')
     parser.add_argument('--attacks', nargs='+', metavar='NAME', default=list(ATTACKS),
                         help=f'those whose names hold these words, of {"; ".join(ATTACKS)}')
+    parser.add_argument('--json', type=Path, metavar='FILE', help='write every attack')
     options = parser.parse_args(arguments)
     names = [name for name in ATTACKS if any(word in name for word in options.attacks)]
     if not names:
@@ -173,6 +174,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(table(outcomes))
     print(f'{node.sent:,} messages and requests, seed {options.seed}; memory of the suite at the '
           f'begin {suite.begin_mb:.0f} MB, at the end {memory:.0f} MB')
+    write_results(options.json, {
+        'seed': options.seed, 'duration_s': options.duration, 'messages': node.sent,
+        'memory_mb': [suite.begin_mb, memory], 'attacks': list(map(asdict, outcomes))})
     return int(not all(outcome.walked_on and outcome.told for outcome in outcomes))
 
 

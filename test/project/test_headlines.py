@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import pytest
 from headlines import (
@@ -58,6 +59,23 @@ def test_falls_are_counted() -> None:
     fell = {'fell': True, 'duration': None, 'phase_error': None}
     results['gaits'][0]['outcome'] |= fell
     assert '60 changes: 1 fall, ' in STUDIES['changes-of-gait'].rows(results)[0]
+
+
+def test_falls_by_pushes_and_of_strange_robots_are_told() -> None:
+    def told_of(anchor: str, results: Any) -> str:
+        headline = STUDIES[anchor].headline
+        assert headline is not None
+        return headline(results)
+
+    results = content('what-the-controllers-do-not-know')
+    results['mismatch'][0]['outcome']['fell'] = True
+    assert ' walks, 1 fall, ' in told_of('what-the-controllers-do-not-know', results)
+    results = content('pushes')
+    results['pushes'][0]['outcome']['speed_change'][3] = 0.4
+    assert 'amble 0.5 m/s: 0.4 m/s (3.6 N s)' in told_of('pushes', results)
+    results = content('other-robots')
+    results['robots'][-1]['outcome']['stop_falls'] = 2
+    assert told_of('other-robots', results).endswith('2 falls in stops')
 
 
 @pytest.mark.parametrize('study', ROWS)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
+import headlines_of_bodies as bodies
 from checkout import ROOT
 
 from dmp_cpg_ros.studies.walking_trials import SteadyOutcome, relative_error
@@ -376,17 +377,20 @@ class Study:
 
     Attributes
     ----------
-    headline : callable
-        Content of its file → headline of the README.
+    headline : callable or None
+        Content of its file → headline of the README, if it has one.
     rows : callable
         Content of its file → lines of the document.
     document : str
         Where its section is.
+    file : str
+        Name of the file where it is not the anchor of the section.
     """
 
-    headline: Callable[[Any], str]
+    headline: Callable[[Any], str] | None
     rows: Callable[[Any], list[str]]
     document: str = 'doc/results.md'
+    file: str = ''
 
 
 STUDIES = {
@@ -398,7 +402,13 @@ STUDIES = {
     'tightness-of-the-certificates': Study(tightness, tightness_rows),
     'falls': Study(falls, fall_rows), 'stops-at-every-phase': Study(stops, stop_rows),
     'brisk-stops': Study(brisk_stops, brisk_rows, 'doc/walking.md'),
-    'when-the-body-stands': Study(body_stops, body_rows, 'doc/walking.md')}
+    'when-the-body-stands': Study(body_stops, body_rows, 'doc/walking.md'),
+    'pushes': Study(bodies.pushes, bodies.push_rows),
+    'pushes-at-rest-and-while-stopping': Study(
+        None, bodies.manoeuvre_rows, 'doc/walking.md', 'pushes'),
+    'what-the-controllers-do-not-know': Study(
+        bodies.mismatch, bodies.mismatch_rows, 'doc/walking.md'),
+    'other-robots': Study(bodies.robots, bodies.robot_rows)}
 """Studies that have a file, ``doc/results/ANCHOR.json``, by the anchor of their section; that of
 the experiment is a run's ``metrics.json``, and that of stops is :data:`STOPS`.
 """
@@ -412,12 +422,14 @@ def content(anchor: str) -> Any:
     if anchor in TABLES_OF_STOPS:
         return dict(zip(TABLES_OF_STOPS, tables(STOPS.read_text(encoding='utf-8')), strict=True))[
             anchor]
-    return json.loads((FOLDER / f'{anchor}.json').read_text(encoding='utf-8'))
+    name = STUDIES[anchor].file or anchor
+    return json.loads((FOLDER / f'{name}.json').read_text(encoding='utf-8'))
 
 
 def headlines() -> dict[str, str]:
     """Headlines by the anchor of their row, of all studies that have a file."""
-    return {anchor: study.headline(content(anchor)) for anchor, study in STUDIES.items()}
+    return {anchor: study.headline(content(anchor)) for anchor, study in STUDIES.items()
+            if study.headline}
 
 
 def missing(anchor: str) -> list[str]:

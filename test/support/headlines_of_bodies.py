@@ -1,0 +1,174 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the documents say of studies of the body: pushes, what is not known of it, other robots.
+
+Each study has its headline of the README and rows of a document's tables, made from the content of
+the file that its command has written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import product
+from math import nan
+from statistics import median
+from typing import Any
+
+from dmp_cpg_ros.studies.benchmark_cases import MISMATCHED, MISMATCHED_WALKS
+from dmp_cpg_ros.studies.benchmark_walking import steady_cells
+from dmp_cpg_ros.studies.trial_tables import least_and_median
+from dmp_cpg_ros.studies.walking_trials import SteadyOutcome, relative_error
+
+MASS = 8.91
+"""Of the package's own robot [kg]."""
+
+Pushes = dict[str, list[list[float]]]
+"""Speed changes that were survived (phases, directions), by who was pushed [m/s]."""
+
+
+def steady_outcome(outcome: dict[str, Any]) -> SteadyOutcome:
+    """Outcome of a velocity that was held."""
+    return SteadyOutcome(**{name: nan if value is None else value
+                            for name, value in outcome.items()})
+
+
+# --- pushes -------------------------------------------------------------------------------------
+
+
+def survived(results: Any, *names: str) -> Pushes:
+    """Pushes survived, by what their cases have under some names."""
+    of: Pushes = {}
+    for one in results:
+        key = ' '.join(f'{one["case"][name]:g}' if isinstance(one['case'][name], float)
+                       else one['case'][name] for name in names)
+        of.setdefault(key, []).append(one['outcome']['speed_change'])
+    return of
+
+
+def least(changes: Sequence[Sequence[float]]) -> float:
+    """Largest push that is survived at every phase from everywhere [m/s]."""
+    return min(map(min, changes))
+
+
+def at_rest(results: Any) -> dict[float, dict[bool, list[bool]]]:
+    """Falls by pushes all around a robot at rest: by speed change, and whether it may step."""
+    of: dict[float, dict[bool, list[bool]]] = {}
+    for one in results['manoeuvres']:
+        case = one['case']
+        if case['manoeuvre'] == 'at rest' and not case['drawn']:
+            of.setdefault(case['speed_change'], {}).setdefault(case['recovery'], []).append(
+                one['outcome']['fell'])
+    return of
+
+
+def pushes(results: Any) -> str:
+    """Of ``benchmark_walking --tables pushes manoeuvres``."""
+    walks, resting = survived(results['pushes'], 'gait', 'speed'), at_rest(results)
+    amble, (low, high) = least(walks['amble 0.5']), (min(resting), max(resting))
+
+    def falls(change: float, steps: bool) -> str:
+        return f'{sum(resting[change][steps])} of {len(resting[change][steps])}'
+
+    return (f'at every phase, from everywhere, amble 0.5 m/s: {amble:.1f} m/s '
+            f'({amble * MASS:.1f} N s), trot: {least(walks["trot 0.5"]):.1f} m/s; at rest '
+            f'{low:g} m/s from {len(resting[low][True])} directions: {falls(low, True)} falls '
+            f'(without steps {falls(low, False)}), {high:g} m/s: {falls(high, True)} '
+            f'({falls(high, False)})')
+
+
+def push_rows(results: Any) -> list[str]:
+    """Rows of the table of pushes."""
+    return [' | '.join((f'| {name} m/s', *least_and_median(of))) + ' |'
+            for name, of in survived(results['pushes'], 'gait', 'speed').items()]
+
+
+def manoeuvre_rows(results: Any) -> list[str]:
+    """Rows of the table of pushes at rest and in manoeuvres."""
+    cells: dict[tuple[str, bool, float], dict[bool, list[Any]]] = {}
+    for one in results['manoeuvres']:
+        case = one['case']
+        cells.setdefault((case['manoeuvre'], case['drawn'], case['speed_change']), {}).setdefault(
+            case['recovery'], []).append(one['outcome'])
+    rows = []
+    for (name, drawn, change), of in cells.items():
+        fell = [f'{sum(one["fell"] for one in of[steps])}/{len(of[steps])}' if steps in of else '–'
+                for steps in (False, True)]
+        told = (sum(one['rests'] for one in of[True]), max(one['releases'] for one in of[True]))
+        rests = map(str, told) if False in of else '––'  # no stop is in force in the others
+        rows.append(' | '.join((
+            f'| {name}', 'drawn' if drawn else f'{len(of[True])} directions', f'{change:g}',
+            *fell, *rests)) + ' |')
+    return rows
+
+
+# --- robots that are others ---------------------------------------------------------------------
+
+
+def mismatched(results: Any) -> Iterator[tuple[str, str, list[float], int]]:
+    """What is not known, who walks, errors of the speed [%], and how many walked."""
+    cells = list(product(MISMATCHED, MISMATCHED_WALKS))
+    each = len(results['mismatch']) // len(cells)
+    for k, (what, (gait, speed)) in enumerate(cells):
+        of = [steady_outcome(one['outcome'])
+              for one in results['mismatch'][k * each:(k + 1) * each]]
+        yield what, f'{gait} {speed:g}', [
+            100.0 * relative_error(one, (speed, 0.0, 0.0)) for one in of if not one.fell], each
+
+
+def mismatch(results: Any) -> str:
+    """Of ``benchmark_walking --tables mismatch``."""
+    of = list(mismatched(results))
+    walks = sum(each for *_, each in of)
+    fell = walks - sum(len(errors) for _, _, errors, _ in of)
+    worst = max(max(errors) for _, _, errors, _ in of)
+    return ("payload of the robot's mass, a drive at 40 %, ten times the friction or the sensors' "
+            f'noise, mass 3 cm aside: {walks} walks, {fell or "no"} fall, speed within '
+            f'{worst:.1f} %')
+
+
+def mismatch_rows(results: Any) -> list[str]:
+    """Rows of the table of robots that are not as their controllers know them."""
+    return [f'| {what} | {who} | {each - len(errors)}/{each} | {median(errors):.1f} | '
+            f'{max(errors):.1f} |' for what, who, errors, each in mismatched(results)]
+
+
+ROBOTS = {
+    'mini_quadruped': "the package's own", 'mini_cheetah': 'Mini Cheetah', 'go1': 'Go1',
+    'go2': 'Go2', 'aliengo': 'AlienGo', 'a2': 'A2', 'spot': 'Spot', 'pegasus': 'Pegasus',
+    'b2': 'B2', 'hyqreal1': 'HyQReal 1', 'hyqreal2': 'HyQReal 2'}
+"""Names of the robots by those of their files."""
+
+NUMBERS = ('no', 'one', 'two', 'three', 'four', 'five', 'six', 'seven', 'eight', 'nine', 'ten',
+           'eleven', 'twelve')
+
+
+def other_robots(results: Any) -> dict[str, Any]:
+    """Outcomes by the names of the robots."""
+    return {ROBOTS[one['case']['file'].rpartition('/')[2].removesuffix('.yaml')]: one['outcome']
+            for one in results['robots']}
+
+
+def robots(results: Any) -> str:
+    """Of ``benchmark_walking --tables robots``."""
+    of = {name: one for name, one in other_robots(results).items()
+          if name != ROBOTS['mini_quadruped']}
+    mass, top = ([one[name] for one in of.values()] for name in ('mass', 'top_speed'))
+    first, *_, last = of
+    return (f'{NUMBERS[len(of)]} of {min(mass):.0f} to {max(mass):.0f} kg, {first} to '
+            f'{last.split()[0]}: trot held at {min(top):.1f} to {max(top):.1f} m/s, '
+            f'{sum(one["stop_falls"] for one in of.values())} falls in stops')
+
+
+def robot_rows(results: Any) -> list[str]:
+    """Rows of the table of other robots."""
+    rows = []
+    for name, of in other_robots(results).items():
+        cells = []
+        for gait, speed in (('amble', 0.5), ('trot', 1.0)):
+            _, error, _, cost = steady_cells((speed, 0.0, 0.0), steady_outcome(of[gait]))
+            cells.append(f'{error} %, {cost}')
+        rows.append(' | '.join((
+            f'| {name}', f'{of["mass"]:.1f}', *cells, f'{of["top_speed"]:.1f} m/s',
+            f'{of["stood"]} / {of["walked_on"]} / {of["stop_falls"]}',
+            f'{of["pushed"]:.1f} ({of["pushed"] * of["mass"]:.0f})')) + ' |')
+    return rows
