@@ -19,7 +19,7 @@ from typing import Any
 import headlines_of_bodies as bodies
 from checkout import ROOT
 
-from dmp_cpg_ros.studies.walking_trials import SteadyOutcome, relative_error
+from dmp_cpg_ros.studies.walking_trials import relative_error
 
 README = ROOT / 'README.md'
 
@@ -146,8 +146,7 @@ def speeds(results: Any) -> str:
 
 def errors(one: Any) -> float:
     """Relative error of a velocity that was held; without a fall it is a number."""
-    outcome = SteadyOutcome(**{name: value if value is not None else float('nan')
-                               for name, value in one['outcome'].items()})
+    outcome = bodies.steady_outcome(one['outcome'])
     assert not outcome.fell, one
     return relative_error(outcome, tuple(one['case']['velocity']))
 
@@ -156,11 +155,10 @@ def gaits(results: Any) -> str:
     """Of ``benchmark_walking --tables gaits``."""
     outcomes = [one['outcome'] for one in results['gaits']]
     names = {one['case']['before'] for one in results['gaits']}
-    number = ('no', 'one', 'two', 'three', 'four', 'five', 'six')[len(names)]
     worst = max(one['phase_error'] for one in outcomes if not one['fell'])
     digits, power = f'{worst:.0e}'.split('e')
     sign = str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))
-    return (f'{len(outcomes)} changes between {number} gaits: '
+    return (f'{len(outcomes)} changes between {bodies.NUMBERS[len(names)]} gaits: '
             f'{sum(one["fell"] for one in outcomes) or "no"} fall, largest phase error '
             f'{digits}·10{sign} rad')
 

@@ -93,8 +93,10 @@ def manoeuvre_rows(results: Any) -> list[str]:
     for (name, drawn, change), of in cells.items():
         fell = [f'{sum(one["fell"] for one in of[steps])}/{len(of[steps])}' if steps in of else '–'
                 for steps in (False, True)]
-        told = (sum(one['rests'] for one in of[True]), max(one['releases'] for one in of[True]))
-        rests = map(str, told) if False in of else '––'  # no stop is in force in the others
+        rests = ['–', '–']  # where no stop is in force
+        if False in of:
+            rests = [str(sum(one['rests'] for one in of[True])),
+                     str(max(one['releases'] for one in of[True]))]
         rows.append(' | '.join((
             f'| {name}', 'drawn' if drawn else f'{len(of[True])} directions', f'{change:g}',
             *fell, *rests)) + ' |')

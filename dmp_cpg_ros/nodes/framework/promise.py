@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from math import inf, isfinite, nan
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.certificates import gate
@@ -19,6 +19,7 @@ from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.prediction import Outlook, looking_ahead, next_gait
 from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.rounding import exactly, no_less
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters, TickParameters
@@ -105,9 +106,9 @@ class Present(NamedTuple):
     slow : GaitNetwork
         Their network at the cadence without the quickness that acts.
     r : ndarray (3,)
-        The reference.
+        The reference v_x, v_y [m/s], γ [rad/s].
     command : tuple of float
-        External command, assumed to stay (v_x, v_y, γ).
+        External command of the same, assumed to stay.
     barring : str
         What the body does, assumed to stay.
     """
@@ -116,7 +117,7 @@ class Present(NamedTuple):
     acting: Inhibition
     canonical: CanonicalState
     slow: GaitNetwork
-    r: Any
+    r: Array
     command: tuple[float, float, float]
     barring: str
 
@@ -141,7 +142,7 @@ class Promises:
     due_ns : float
         Until when a stop is to rest, on the robot's clock [ns]; infinite where there is no bound.
     command : tuple of float
-        With which it was predicted.
+        With which it was predicted, v_x, v_y [m/s], γ [rad/s].
     """
 
     def __init__(self, node: SuiteNode, certified: Certified, gait: GaitInForce) -> None:
