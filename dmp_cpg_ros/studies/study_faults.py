@@ -3,11 +3,11 @@
 """Kills nodes of a walking suite with SIGKILL, each in turn at random times, and tabulates it all.
 
 With --respawn one walk takes many kills, each after all nodes have been ready again; without, one.
-A walk is in phase again when its legs are in their places and the body has half of its speed; the
-cycles until then count from the moment at which the robot follows its legs again, or at which
-all nodes are ready, whichever is earlier. A recorder that is killed leaves a bag that nobody has
-closed: what is told is how much of the time before the kill is not in it, and how many ticks are
-missing within. Exit status 1 when a robot fell.
+A walk is in phase again when its oscillators turn, each in its place; it is as fast again when the
+body has half of its speed besides. The cycles until then count from the moment at which the robot
+follows its legs again, or at which all nodes are ready, whichever is earlier. A recorder that is
+killed leaves a bag that nobody has closed: what is told is how much of the time before the kill is
+not in it, and how many ticks are missing within. Exit status 1 when a robot fell.
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ VICTIMS = tuple(node for node in WALKING_NODES if node != ROBOT)
 READY, FOLLOWS = 'all nodes are ready again', 'the robot follows its legs again'
 
 COLUMNS = ('gait', 'time', 'respawn', 'walks', 'kills', 'fell', 'in phase again', 'cycles, median '
-           '/ worst', 'seconds after the kill, median / worst', 'ended standing / lying / fallen',
+           '/ worst', 'until as fast again', 'seconds after the kill, median / worst',
+           'ended standing / lying / fallen',
            "recorder's bags: s missing, median / worst; gaps")
 
 
@@ -64,8 +65,9 @@ class Kill:
         Which.
     time_s : float
         On the robot's clock [s].
-    back_s, in_phase_s : float
-        When its messages were followed again, and when the walk was in phase again [s].
+    back_s, in_phase_s, as_fast_s : float
+        When its messages were followed again, when the walk was in phase again, and when the body
+        had half of its speed besides [s].
     follows_s : float
         When the robot, which had looked after itself, followed its legs again [s].
     period_s : float
@@ -81,14 +83,14 @@ class Kill:
     back_s: float = inf
     follows_s: float = -inf
     in_phase_s: float = inf
+    as_fast_s: float = inf
     period_s: float = nan
     unrecorded_s: float = nan
     gaps: int = 0
 
-    @property
-    def cycles(self) -> float:
-        """Cycles from its return to the walk in phase."""
-        return max(0.0, self.in_phase_s - self.back_s) / self.period_s
+    def cycles(self, until_s: float) -> float:
+        """Cycles from its return until a moment [s]."""
+        return max(0.0, until_s - self.back_s) / self.period_s
 
 
 @dataclass
@@ -185,8 +187,8 @@ def _judge(outcome: Outcome, speed: float, folder: Path) -> None:
     own = np.array([[scalar_phase(*leg) for leg in x] for x in canonical.x.tolist()]) - phases
     off = np.abs(np.angle(np.exp(1j * (own - own[:, :1])))).max(axis=1)
     pace = np.interp(canonical.time, odometry.time, odometry.velocity_in_base[:, 0])
-    well = (off <= LOCKED_PHASE_ERROR) & (pace > 0.5 * speed)
     turned = np.unwrap(own[:, 0])
+    rate = np.gradient(turned, canonical.time)
     following = [kill.time_s for kill in outcome.kills[1:]] + [inf]
     for kill, following_s in zip(outcome.kills, following, strict=True):
         before = (canonical.time > kill.time_s - 1.0) & (canonical.time <= kill.time_s)
@@ -194,9 +196,12 @@ def _judge(outcome: Outcome, speed: float, folder: Path) -> None:
             way = np.ptp(turned[before]) / np.ptp(canonical.time[before])
             kill.period_s = 2.0 * np.pi / way if way > 0.0 else nan
         # While the robot comes to a stand by itself its pace is not that of its legs.
-        again = canonical.time[well & (canonical.time >= max(kill.back_s, kill.follows_s))]
-        # one that the next kill forestalled says nothing
-        kill.in_phase_s = float(again[0]) if len(again) and again[0] <= following_s else inf
+        well = ((canonical.time >= max(kill.back_s, kill.follows_s)) & (off <= LOCKED_PHASE_ERROR)
+                & (rate > np.pi / kill.period_s))
+        kill.in_phase_s, kill.as_fast_s = (
+            # one that the next kill forestalled says nothing
+            next(iter(canonical.time[so & (canonical.time <= following_s)].tolist()), inf)
+            for so in (well, well & (pace > 0.5 * speed)))
 
 
 def rows(outcomes: Sequence[Outcome]) -> Iterator[list[str]]:
@@ -205,14 +210,14 @@ def rows(outcomes: Sequence[Outcome]) -> Iterator[list[str]]:
     for way in ways:
         own = [one for one in outcomes if (one.gait, one.lock_step, one.respawn) == way]
         kills, ends = [kill for one in own for kill in one.kills], [one.end for one in own]
-        again = [kill for kill in kills if kill.in_phase_s < inf]
-        cycles = [kill.cycles for kill in again if kill.cycles < inf]
-        seconds = [kill.in_phase_s - kill.time_s for kill in again]
+        again = [kill for kill in kills if kill.as_fast_s < inf]
+        seconds = [kill.as_fast_s - kill.time_s for kill in again]
         bags = [kill for kill in kills if kill.unrecorded_s == kill.unrecorded_s]
         yield [way[0], 'lock-step' if way[1] else 'real', 'yes' if way[2] else 'no',
                str(len(own)), str(len(kills)), str(sum(one.fell for one in own)),
-               f'{len(again)} of {len(kills)}' if way[2] else '', _spread(cycles),
-               _spread(seconds),
+               f'{len(again)} of {len(kills)}' if way[2] else '',
+               _spread([kill.cycles(kill.in_phase_s) for kill in again]),
+               _spread([kill.cycles(kill.as_fast_s) for kill in again]), _spread(seconds),
                ' / '.join(str(ends.count(end)) for end in ('standing', 'lying', 'fallen')) + (
                    f', unknown {ends.count("unknown")}' if 'unknown' in ends else ''),
                f'{_spread([bag.unrecorded_s for bag in bags])}; {sum(bag.gaps for bag in bags)}'

@@ -17,6 +17,7 @@ from statistics import median
 from typing import Any
 
 import headlines_of_bodies as bodies
+import headlines_of_faults as faults
 from checkout import ROOT
 
 from dmp_cpg_ros.studies.walking_trials import relative_error
@@ -28,6 +29,9 @@ FOLDER = ROOT / 'doc' / 'results'
 
 STOPS = ROOT / 'doc' / 'stops.md'
 """The tables that ``study_stops`` prints, of :func:`stops` and of :func:`brisk_stops`."""
+
+BENCHMARK = ROOT / 'doc' / 'performance.md'
+"""The table that ``bench_ros`` writes, of :func:`rate`."""
 
 
 def table_of_studies() -> dict[str, list[str]]:
@@ -169,7 +173,7 @@ def any_command(results: Any) -> str:
     kept = 'as predicted and within their bounds' if not late else f'of which {late} were late'
     return (f'{count} walks of 60 s under random commands, gaits and stops on seeds nothing was '
             f'tuned on: {fell or "none"} fell, {stops:,} stops {kept}, {stepped} more stepped '
-            'out of; without governor and caution, on other seeds, 8 of 12 walks fell')
+            'out of')
 
 
 def commanded(results: Any) -> tuple[int, ...]:
@@ -254,6 +258,30 @@ def falls(results: Any) -> str:
             f'{median(fall["seconds"] for fall in stood):.1f} s in the median')
 
 
+def rate(runs: Any) -> str:
+    """Of some ``metrics.json`` of ``walk amble_60`` on slow cores, and the table of the benchmark.
+    """
+    each, composed, slow = (real_time_factor(runs[way])
+                            for way in ('each', 'composed', 'each_100_hz'))
+    assert slow > 0.999, slow
+    return (f'ten processes at 250 Hz on two cores: real-time factor {benchmarked("idle"):.2f}; '
+            f'on [slower cores](doc/performance.md) in slow motion ({each:.2f}, with `--composed` '
+            f'{composed:.2f}), at 100 Hz in real time')
+
+
+def real_time_factor(metrics: Any) -> float:
+    """Of a run in which the robot did not fall."""
+    assert not metrics['robot']['fell'], metrics['robot']
+    return float(metrics['timing']['real_time_factor'])
+
+
+def benchmarked(how: str) -> float:
+    """Real-time factor of ten processes in the benchmark, ``idle`` or ``busy``."""
+    (measured,) = (row['measured'] for table in tables(BENCHMARK.read_text(encoding='utf-8'))
+                   for row in table if row.get('what') == f'{how}: real-time factor')
+    return float(measured)
+
+
 # --- tables of doc/results.md -----------------------------------------------------------------
 
 
@@ -327,6 +355,19 @@ def stair_rows(results: Any) -> list[str]:
     each = len(results['climbing']) // 4
     return [f'| {climbing} | {gait} | {crossed}/{each} | {fell} | {blocked} |'
             for (climbing, gait), (crossed, fell, blocked) in climbed(results).items()]
+
+
+def rate_rows(runs: Any) -> list[str]:
+    """Rows of the table of rates on slow cores, and what the section says of the benchmark."""
+    ways = {'each': 'ten processes | 250', 'blocks': 'blocks | 250',
+            'composed': 'one process and the recorder | 250', 'each_100_hz': 'ten processes | 100'}
+    rows = [f'| {way} Hz | {real_time_factor(runs[name]):.2f} | '
+            f'{runs[name]["timing"]["latency_ms_p50"]:.1f} / '
+            f'{runs[name]["timing"]["latency_ms_p99"]:.1f} ms | '
+            f'{100.0 * runs[name]["tracking"]["v_error_max"]:.1f} % |'
+            for name, way in ways.items()]
+    return [*rows, f'{benchmarked("idle"):.2f} with nothing else to do and '
+            f'{benchmarked("busy"):.2f} beside a busy loop']
 
 
 TIGHTNESS = {
@@ -406,9 +447,14 @@ STUDIES = {
         None, bodies.manoeuvre_rows, 'doc/walking.md', 'pushes'),
     'what-the-controllers-do-not-know': Study(
         bodies.mismatch, bodies.mismatch_rows, 'doc/walking.md'),
-    'other-robots': Study(bodies.robots, bodies.robot_rows)}
+    'other-robots': Study(bodies.robots, bodies.robot_rows),
+    'beside-a-learned-policy': Study(bodies.duel, bodies.duel_rows, 'doc/walking.md'),
+    'rate': Study(rate, rate_rows),
+    'hostile-neighbours': Study(faults.hostile, faults.hostile_rows, 'doc/faults.md'),
+    'killed-nodes': Study(None, faults.kill_rows, 'doc/faults.md')}
 """Studies that have a file, ``doc/results/ANCHOR.json``, by the anchor of their section; that of
-the experiment is a run's ``metrics.json``, and that of stops is :data:`STOPS`.
+the experiment is a run's ``metrics.json``, of rates there are several in a folder, and that of
+stops is :data:`STOPS`.
 """
 
 
@@ -421,13 +467,19 @@ def content(anchor: str) -> Any:
         return dict(zip(TABLES_OF_STOPS, tables(STOPS.read_text(encoding='utf-8')), strict=True))[
             anchor]
     name = STUDIES[anchor].file or anchor
+    if (FOLDER / name).is_dir():
+        return {file.stem: json.loads(file.read_text(encoding='utf-8'))
+                for file in (FOLDER / name).glob('*.json')}
     return json.loads((FOLDER / f'{name}.json').read_text(encoding='utf-8'))
 
 
 def headlines() -> dict[str, str]:
     """Headlines by the anchor of their row, of all studies that have a file."""
-    return {anchor: study.headline(content(anchor)) for anchor, study in STUDIES.items()
-            if study.headline}
+    found = {anchor: study.headline(content(anchor)) for anchor, study in STUDIES.items()
+             if study.headline}
+    # Two studies have one row.
+    found['hostile-neighbours'] += f'; {faults.kills(content("killed-nodes"))}'
+    return found
 
 
 def missing(anchor: str) -> list[str]:

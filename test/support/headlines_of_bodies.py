@@ -1,6 +1,7 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the documents say of studies of the body: pushes, what is not known of it, other robots.
+"""What the documents say of studies of the body: pushes, what is not known of it, other robots,
+a learned policy.
 
 Each study has its headline of the README and rows of a document's tables, made from the content of
 the file that its command has written.
@@ -10,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import product
-from math import nan
+from math import nan, pi
 from statistics import median
 from typing import Any
 
 from dmp_cpg_ros.studies.benchmark_cases import MISMATCHED, MISMATCHED_WALKS
 from dmp_cpg_ros.studies.benchmark_walking import steady_cells
+from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary
 from dmp_cpg_ros.studies.trial_tables import least_and_median
 from dmp_cpg_ros.studies.walking_trials import SteadyOutcome, relative_error
 
@@ -174,3 +176,66 @@ def robot_rows(results: Any) -> list[str]:
             f'{of["stood"]} / {of["walked_on"]} / {of["stop_falls"]}',
             f'{of["pushed"]:.1f} ({of["pushed"] * of["mass"]:.0f})')) + ' |')
     return rows
+
+
+# --- beside a learned policy --------------------------------------------------------------------
+
+
+def tracked(results: Any) -> dict[tuple[float, ...], dict[str, SteadyOutcome]]:
+    """Outcomes by velocity and who walked."""
+    of: dict[tuple[float, ...], dict[str, SteadyOutcome]] = {}
+    for one in results['tracking']:
+        case = one['case']
+        of.setdefault(tuple(case['velocity']), {})[case['walker']] = steady_outcome(one['outcome'])
+    return of
+
+
+def duel_stops(results: Any) -> dict[tuple[str, float], StopSummary]:
+    """Stops by who stopped, and from which speed."""
+    of: dict[tuple[str, float], list[StopOutcome]] = {}
+    for one in results['stops']:
+        case = one['case']
+        of.setdefault((case['walker'], case['speed']), []).append(StopOutcome(**{
+            name: nan if value is None else value for name, value in one['outcome'].items()}))
+    return {key: StopSummary(outcomes) for key, outcomes in of.items()}
+
+
+def duel(results: Any) -> str:
+    """Of ``duel``."""
+    ahead = {v[0]: of for v, of in tracked(results).items() if v[0] > 0.0 and not any(v[1:])}
+    errors = {name: {v: relative_error(of[name], (v, 0.0, 0.0)) for v, of in ahead.items()}
+              for name in ('policy', 'trot')}
+    walks = min(v for v, error in errors['policy'].items() if error < 0.9)
+    of, stops = survived(results['pushes'], 'walker'), duel_stops(results)
+    still = [stops[name, 1.0].spread('still_s')[0] for name in ('trot', 'policy')]
+    return ("on MuJoCo Playground's Go1: a trot keeps "
+            f'{min(ahead):g} to {max(ahead):g} m/s within '
+            f'{100.0 * max(errors["trot"].values()):.1f} % (the policy stands below {walks:g} '
+            f'm/s), withstands {least(of["trot"]):.1f} m/s from everywhere (the policy '
+            f'{least(of["policy"]):.1f}), stops from 1 m/s in {still[0]:.2f} s ({still[1]:.2f})')
+
+
+def duel_rows(results: Any) -> list[str]:
+    """Rows of the tables of the duel: velocities held, pushes, stops, standing."""
+    rows: list[tuple[str, ...]] = []
+    for velocity, of in tracked(results).items():
+        cells = []
+        for outcome in of.values():
+            reached, error, drift, cost = steady_cells(
+                (velocity[0], velocity[1], velocity[2]), outcome)
+            walked = '' if drift == '-' else f', {drift}°, {cost}'
+            cells.append(reached if outcome.fell else f'{error} %{walked}')
+        rows.append((', '.join(f'{part:g}' for part in velocity), *cells))
+    rows += [(name, *least_and_median(changes))
+             for name, changes in survived(results['pushes'], 'walker').items()]
+    rows += [(name, f'{speed:g}', str(stops.number('fell')), str(stops.number('standing')),
+              *(stops.cell(what, scale, digits) for what, scale, digits in (
+                    ('still_s', 1.0, 2), ('displacement_m', 1.0, 2), ('slip_m', 1e3, 1),
+                    ('tilt', 180.0 / pi, 1), ('deceleration', 1.0, 1))))
+             for (name, speed), stops in duel_stops(results).items()]
+    for one in results['standing']:
+        at, name = one['outcome'], one['case']['walker']
+        rows.append(('policy' if name == 'policy' else 'suite', 'yes' if at['fell'] else 'no',
+                     f'{1e3 * at["way"]:.1f}', f'{1e3 * at["speed"]:.1f}', f'{at["torque"]:.2f}',
+                     f'{100.0 * at["loaded"]:.0f} %'))
+    return [' | '.join(('| ' + row[0], *row[1:])) + ' |' for row in rows]

@@ -1,0 +1,68 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the documents say of deaths and intruders, made from the files of their studies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
+from statistics import median
+from typing import Any
+
+from dmp_cpg_ros.studies import intruder, study_faults
+
+SHORT = ('no', 'one', 'two', 'three', 'four', 'five', 'six')
+
+
+def attacks(results: Any) -> list[intruder.Outcome]:
+    """Attacks of ``intruder``; who was never named was so after an infinite time."""
+    return [intruder.Outcome(**{name: inf if value is None else value
+                                for name, value in one.items()})
+            for one in results['attacks']]
+
+
+def hostile(results: Any) -> str:
+    """Of ``intruder``: how long, how much, and what came of it."""
+    of = [one for one in attacks(results) if one.attack != intruder.NOTHING]
+    fell, slow = sum(one.fell for one in of), astray(of)
+    on = 'it walks on as before after each' if not slow else (
+        f'it walks on as before after all but {SHORT[slow]}')
+    named = sorted(one.named_s for one in of)
+    return (f'{results["duration_s"] / 60.0:g} minutes among {results["messages"]:,} hostile '
+            f'messages and requests, {len(of)} attacks: {fell or "no"} fall, {on}, and who sends '
+            f'them is named within {median(named):.1f} s (median), {named[-1]:.1f} s at worst')
+
+
+def astray(of: Sequence[intruder.Outcome]) -> int:
+    """After how many attacks it stood, or went slower or elsewhere than before."""
+    return sum(not one.fell and not one.walked_on for one in of)
+
+
+def kills(results: Any) -> str:
+    """Of ``study_faults``, of which what was in real time was run on a full machine."""
+    told = []
+    for lock_step, how in ((True, 'in lock-step'), (False, 'in real time on a full machine')):
+        of = [one for one in results if one['lock_step'] == lock_step]
+        fell, count = sum(one['fell'] for one in of), sum(len(one['kills']) for one in of)
+        told.append(f'{count} nodes killed {how}: {fell or "no"} fall')
+    return ', '.join(told)
+
+
+def hostile_rows(results: Any) -> list[str]:
+    """Row of the table of runs with an intruder."""
+    of = attacks(results)
+    return [f'(`--duration {results["duration_s"]:g} --seed {results["seed"]}`) | {len(of)} | '
+            f'{sum(one.fell for one in of)} | {astray(of)} |']
+
+
+def outcome(written: Any) -> study_faults.Outcome:
+    """What became of a walk, from a file, which has null for what did not happen."""
+    kills_of = [study_faults.Kill(**{name: value for name, value in kill.items()
+                                     if value is not None}) for kill in written['kills']]
+    return study_faults.Outcome(**{**written, 'kills': kills_of})
+
+
+def kill_rows(results: Any) -> list[str]:
+    """Rows of the table of kills, without what recorders leave."""
+    return [' | '.join(('| ' + row[0], *row[1:-1])) + ' |'
+            for row in study_faults.rows(list(map(outcome, results)))]
