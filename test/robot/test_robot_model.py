@@ -4,9 +4,12 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_parts import find_ids
@@ -179,6 +182,20 @@ def test_a_model_for_accelerators_is_solved_as_any_other(model, tmp_path):
         mujoco.mj_step(each, state, 200)
         data.append(state.qpos.copy())
     np.testing.assert_array_equal(*data)
+
+
+@pytest.mark.parametrize('names', [
+    '<compiler meshdir="parts"/><asset><mesh file="queue"/></asset>',
+    '<asset><texture type="2d" name="t" file="/dev/zero"/></asset>',
+    '<include file="parts/queue"/>', '<include file="other.xml"/>'])
+def test_a_model_that_would_be_read_for_ever_is_refused(tmp_path, names):
+    (tmp_path / 'parts').mkdir()
+    os.mkfifo(tmp_path / 'parts' / 'queue')
+    (tmp_path / 'other.xml').write_text(
+        '<mujoco><include file="other.xml"/><asset><hfield file="parts/queue"/></asset></mujoco>')
+    (tmp_path / 'model.xml').write_text(f'<mujoco>{names}</mujoco>')
+    with pytest.raises(ParameterError, match='names .*, which is a (pipe|device), not a file'):
+        load_model(tmp_path / 'model.xml', 'trunk')
 
 
 def test_the_inertia_that_a_swing_moves_is_that_of_the_leg_about_its_hip():
