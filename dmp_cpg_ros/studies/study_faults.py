@@ -210,14 +210,15 @@ def rows(outcomes: Sequence[Outcome]) -> Iterator[list[str]]:
     for way in ways:
         own = [one for one in outcomes if (one.gait, one.lock_step, one.respawn) == way]
         kills, ends = [kill for one in own for kill in one.kills], [one.end for one in own]
-        again = [kill for kill in kills if kill.as_fast_s < inf]
-        seconds = [kill.as_fast_s - kill.time_s for kill in again]
+        again = [kill for kill in kills if kill.in_phase_s < inf]
+        fast = [kill for kill in kills if kill.as_fast_s < inf]
+        seconds = [kill.as_fast_s - kill.time_s for kill in fast]
         bags = [kill for kill in kills if kill.unrecorded_s == kill.unrecorded_s]
         yield [way[0], 'lock-step' if way[1] else 'real', 'yes' if way[2] else 'no',
                str(len(own)), str(len(kills)), str(sum(one.fell for one in own)),
                f'{len(again)} of {len(kills)}' if way[2] else '',
                _spread([kill.cycles(kill.in_phase_s) for kill in again]),
-               _spread([kill.cycles(kill.as_fast_s) for kill in again]), _spread(seconds),
+               _spread([kill.cycles(kill.as_fast_s) for kill in fast]), _spread(seconds),
                ' / '.join(str(ends.count(end)) for end in ('standing', 'lying', 'fallen')) + (
                    f', unknown {ends.count("unknown")}' if 'unknown' in ends else ''),
                f'{_spread([bag.unrecorded_s for bag in bags])}; {sum(bag.gaps for bag in bags)}'

@@ -9,9 +9,9 @@ from math import inf
 from statistics import median
 from typing import Any
 
-from dmp_cpg_ros.studies import intruder, study_faults
+from headlines_of_bodies import NUMBERS
 
-SHORT = ('no', 'one', 'two', 'three', 'four', 'five', 'six')
+from dmp_cpg_ros.studies import intruder, study_faults
 
 
 def attacks(results: Any) -> list[intruder.Outcome]:
@@ -26,7 +26,7 @@ def hostile(results: Any) -> str:
     of = [one for one in attacks(results) if one.attack != intruder.NOTHING]
     fell, slow = sum(one.fell for one in of), astray(of)
     on = 'it walks on as before after each' if not slow else (
-        f'it walks on as before after all but {SHORT[slow]}')
+        f'it walks on as before after all but {NUMBERS[slow]}')
     named = sorted(one.named_s for one in of)
     return (f'{results["duration_s"] / 60.0:g} minutes among {results["messages"]:,} hostile '
             f'messages and requests, {len(of)} attacks: {fell or "no"} fall, {on}, and who sends '
