@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from dmp_cpg_ros.core.clock import fresh
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.modes.falls import BodySense, FallParameters
 from dmp_cpg_ros.core.modes.motion_library import RISE, Movements, lying_posture
@@ -25,6 +26,7 @@ from dmp_cpg_ros.robot.drive_watch import DriveWatch
 from dmp_cpg_ros.robot.last_cycle import LastCycle, Rhythm
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 from dmp_cpg_ros.robot.target_loss import BORNE, LITTLE, TargetLoss
+from dmp_cpg_ros.robot.target_watch import TargetWatch
 
 CARRIED_NS = 24_000_000
 """Age up to which late targets are carried on by their own velocity [ns]."""
@@ -115,6 +117,7 @@ class CommandWatchdog:
                  tick_ns: int = 0) -> None:
         """Start without targets."""
         self._losses = [TargetLoss(tick_ns, timeout_ns) for _ in LEGS]
+        self._watches = [TargetWatch(timeout_ns) for _ in LEGS]
         self._losing = False
         self._timeout_ns, self._lead_ns, self._targets = timeout_ns, lead_ns, np.zeros((3, 12))
         self.stamps: list[int | None] = [None] * len(LEGS)
@@ -136,10 +139,11 @@ class CommandWatchdog:
         self._start = self._targets
 
     def accept(self, leg: str, stamp_ns: int, targets: JointTargets) -> None:
-        """Take a leg's targets, unless they are not newer than the newest."""
+        """Take a leg's targets, unless they are not newer than the newest or not believed."""
         i = LEGS.index(leg)
         newest = self.stamps[i]
-        if newest is not None and stamp_ns <= newest:
+        if (newest is not None and stamp_ns <= newest
+                or not self._watches[i].believes(stamp_ns, targets)):
             return
         self.stamps[i] = stamp_ns
         self._losses[i].accept(stamp_ns)
@@ -156,6 +160,12 @@ class CommandWatchdog:
         """Legs whose targets are missing or too old."""
         return [leg for leg, stamp in zip(LEGS, self.stamps, strict=True)
                 if stamp is None or now_ns - stamp > self._timeout_ns]
+
+    def doubted(self, now_ns: int) -> list[str]:
+        """Legs whose targets jump, or repeat while they move, or did so a moment ago."""
+        return [leg for leg, watch in zip(LEGS, self._watches, strict=True)
+                if 0 <= watch.doubted_ns and fresh(
+                    watch.doubted_ns, now_ns, self._timeout_ns)]
 
     @property
     def lost(self) -> float:

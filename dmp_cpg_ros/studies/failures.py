@@ -161,7 +161,8 @@ class FailingWalk:
         self.tilt = max(self.tilt, acos(min(1.0, max(-1.0, vertical))))
         estimator = self.loop.estimator_state
         if injector.acting:
-            self.named.update(f'targets of {leg}' for leg in guard.silent(state.time_ns))
+            self.named.update(f'targets of {leg}' for leg in (
+                *guard.silent(state.time_ns), *guard.doubted(state.time_ns)))
             self.named.update(() if estimator is None else estimator.estimate.problems)
         targets = guard.targets(state)
         self.loop.told_drive(guard.fallback)
@@ -225,6 +226,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--kinds', nargs='+', choices=KINDS, default=KINDS)
     parser.add_argument('--draws', type=at_least_one, metavar='N',
                         help='draw N cases of each cell, and count those that fall or stop')
+    parser.add_argument('--seed', type=int, default=0, help='of the first case of each cell')
     parser.add_argument('--robots', nargs='+', default=[Case._field_defaults['robot']],
                         metavar='FILE', help='of which one is drawn')
     return run_command(parser, arguments, _study)
@@ -233,7 +235,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _study(options: argparse.Namespace, _: Any) -> int:
     cells = [(gait, component, kind) for gait in options.gaits
              for component in options.components for kind in options.kinds]
-    cases = {cell: [drawn(cell, seed, options.robots) for seed in range(options.draws)]
+    seeds = range(options.seed, options.seed + (options.draws or 0))
+    cases = {cell: [drawn(cell, seed, options.robots) for seed in seeds]
              if options.draws else [Case(*cell)] for cell in cells}
     outcomes = study([case for of in cases.values() for case in of],
                      Workers(options.workers, options.cluster))

@@ -30,6 +30,9 @@ RETREATS = {'stand': 'it takes up a stand', 'lie': 'it lowers itself onto its be
             'damp': 'its joints are damped'}
 """What the robot does by itself, in words."""
 
+GOES_ON = 'it goes on with its last rhythm'
+"""The same of a robot that does not fall back yet."""
+
 
 class DrivenRobot(SuiteNode):
     """Reads targets of the joints, watches their age, and says what the joints do."""
@@ -44,7 +47,7 @@ class DrivenRobot(SuiteNode):
         self._timing, self._reader = (
             RobotTiming(), JointTargetsReader(description.joint_names))
         self._drive_mode, self._drive_publisher = '', self.publisher('drive_mode')
-        self._silent_ns = {'silent': -1, 'late': -1, 'lost': -1}
+        self._silent_ns = {'silent': -1, 'doubted': -1, 'late': -1, 'lost': -1}
         kept = KnownStop(self, 'kept_gains')
         known_stop.listen(self, ('acting_gains',), lambda _, *known: kept.learn(*known))
         self.forget_targets()
@@ -66,7 +69,9 @@ class DrivenRobot(SuiteNode):
     def watchdog_values(self) -> dict[str, Any]:
         """What ``/diagnostics`` tells of the watchdog."""
         guard = self._guard
-        return {'silent_legs': ' '.join(guard.silent(self._state.time_ns)) or 'none',
+        now = self._state.time_ns
+        return {'silent_legs': ' '.join(guard.silent(now)) or 'none',
+                'doubted_legs': ' '.join(guard.doubted(now)) or 'none',
                 'guarded_ticks': guard.ticks, 'carried_ticks': guard.carried,
                 'lateness_ms': 1e-6 * guard.lateness_ns, 'lost_share': guard.lost}
 
@@ -84,13 +89,17 @@ class DrivenRobot(SuiteNode):
         return leg, stamp, targets
 
     def watch_silence(self, now: int) -> None:
-        """Tell once that legs are silent, late all the time, or lose too much, until that has been
-        over for a while.
+        """Tell once that legs are silent, not believed, late all the time, or lose too much, until
+        that has been over for a while.
         """
         guard = self._guard
-        silent, heard = guard.unheard(now), any(guard.stamps)
+        doubted, heard = guard.doubted(now), any(guard.stamps)
+        silent = [leg for leg in guard.unheard(now) if leg not in doubted]
         if heard:
             self.tell_drive(guard.fallback)
+        self._tell_silence('doubted', now, bool(doubted), lambda: (
+            f'targets of {", ".join(doubted)} are not believed: they jump by more than their '
+            'velocity says, or repeat while they move'))
         self._tell_silence('silent', now, heard and bool(silent),
                            lambda: f'no targets from {", ".join(silent)} for '
                            f'{self._drive_options.target_timeout} s')
@@ -102,8 +111,8 @@ class DrivenRobot(SuiteNode):
         if true:
             self._silent_ns[key] = now
             if not self.health.has_problem(key):
-                self.warn(key, f'{what()}: the robot looks after itself: '
-                          f'{RETREATS[self._guard.fallback]}', error=True)
+                retreat = RETREATS.get(self._guard.fallback, GOES_ON)
+                self.warn(key, f'{what()}: the robot looks after itself: {retreat}', error=True)
         elif not fresh(self._silent_ns[key], now, INCIDENT_NS):
             self.clear(key)
 

@@ -102,6 +102,45 @@ def test_a_turn_rate_that_jumps_is_not_believed_for_a_while() -> None:
     assert not any(seen[:20]) and all(seen[30:])
 
 
+def usable_imu(change: Callable[[int, SensorReadings], None], ticks: int) -> list[bool]:
+    """Tell at each tick whether the IMU is believed whose readings are changed."""
+    watch, seen = first_watch(readings(0)), []
+    for k in range(1, ticks):
+        told = readings(k)
+        change(k, told)
+        watch, passed = without_frozen(watch, told)
+        seen.append(passed.imu_is_usable)
+    return seen
+
+
+def test_of_a_gyroscope_that_tells_anything_nothing_is_believed() -> None:
+    random = np.random.default_rng(1)
+
+    def garbage(k: int, told: SensorReadings) -> None:
+        if 20 <= k < 500:
+            told.rate_in_base[:] = 20.0 * random.standard_normal(3)
+
+    seen = usable_imu(garbage, 600)
+    assert all(seen[:18])
+    assert not any(seen[19:499])
+    assert all(seen[530:])
+
+
+def test_an_imu_that_is_new_now_and_then_only_is_not_believed() -> None:
+    kept: list[SensorReadings] = []
+
+    def slow(k: int, told: SensorReadings) -> None:
+        if 20 <= k < 500:
+            if k % 25 == 20:
+                kept[:] = [readings(k)]
+            told.rate_in_base[:] = kept[0].rate_in_base
+            told.specific_force_in_base[:] = kept[0].specific_force_in_base
+
+    seen = usable_imu(slow, 600)
+    assert not any(seen[33:499])  # what repeats is frozen after 50 ms, and for as long as it does
+    assert all(seen[530:])
+
+
 def swing(k: int, told: SensorReadings) -> None:
     """Let all joints swing as those of a walking robot do."""
     phase = 2.0 * np.pi * 1e-9 * TICK_NS * k / 0.5 + np.arange(12)
