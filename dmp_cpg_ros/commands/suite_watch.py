@@ -161,27 +161,36 @@ class SuiteWatch:
         player, now = self._player, time.monotonic()
         progress = player.progress_ns, player.drive == DRIVE_MODES[0]
         if self._progress is None or progress != self._progress and progress[1]:
+            if self._asked is not None:
+                self._asked.end()
             self._progress, self._asked = progress, None
             self._stalled, self._stalled_s = health.Intervals(FIRST_WORD_S), now
         elif self._stalled.due() and progress[0] > 0 and self._returning is None:
             if not player.busy:
                 player.remind()
-            if self._asked is None:
-                self._asked = health.ReadinessOfOthers(player, list(self._transitions))
-                self._asked.missing()
+            asked, self._asked = self._asked, health.ReadinessOfOthers(
+                player, list(self._transitions))
+            self._asked.missing()
+            if asked is None:
                 return
-            missing = [text for text in self._asked.missing() if text.endswith(health.NO_ANSWER)]
-            self._say(player.progress_ns * 1e-9, 'the robot waits'
-                      + (f' for {"; ".join(missing)}' if missing else ''))
-            if missing and now > self._stalled_s + HUNG_S:
-                self._end_hung({text.partition(':')[0] for text in missing})
+            silent = [text for text in asked.missing() if text.endswith(health.NO_ANSWER)]
+            said = [f'{name}: {text[text.find(words):]}' for name, text in asked.said.items()
+                    for words in (health.FAILED, health.LACKS) if words in text]
+            asked.end()
+            because = '; '.join((*silent, *said))
+            self._say(player.progress_ns * 1e-9,
+                      'the robot waits' + (f' for {because}' if because else ''))
+            failed = [text for text in said if health.FAILED in text]
+            if failed or (silent and now > self._stalled_s + HUNG_S):
+                self._end_hung({text.partition(':')[0] for text in failed or silent},
+                               '; '.join(failed) or f'no answer for {HUNG_S:g} s')
 
-    def _end_hung(self, nodes: set[str]) -> None:
+    def _end_hung(self, nodes: set[str], why: str) -> None:
         hung = [name for name, own in self._shared.items() if nodes.intersection(own)]
         if not self._respawn:
-            raise SuiteError(f'{", ".join(hung)} hung: no answer for {HUNG_S:g} s')
+            raise SuiteError(f'{", ".join(hung)} hung: {why}')
         for name in hung:
-            self._say(self._player.progress_ns * 1e-9, f'{name} hung and is ended')
+            self._say(self._player.progress_ns * 1e-9, f'{name} hung ({why}) and is ended')
             self._group.kill(name)
         self._progress = None
 

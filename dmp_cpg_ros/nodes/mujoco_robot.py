@@ -8,7 +8,7 @@ In real time it keeps the wall clock's pace; in lock-step it waits for every tar
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -235,19 +235,20 @@ class MujocoRobotNode(DrivenRobot):
 
     def _on_targets(self, message: Any) -> None:
         leg, stamp, targets = self.read_targets(message)
-        known: Collection[int | None] = self._guard.stamps
-        if self._faults is None:
-            self._guard.accept(leg, stamp, targets)
-        else:  # a lock-step waits for what was sent, also where it does not arrive
-            self._arrived[leg] = stamp
-            known = [self._arrived.get(of) for of in LEGS]
-            for message in self._faults.sent([(leg, stamp, targets)]):
-                self._guard.accept(*message)
+        self._arrived[leg] = stamp  # what a lock-step waits for, believed or not
+        sent = [(leg, stamp, targets)]
+        for arriving in sent if self._faults is None else self._faults.sent(sent):
+            self._guard.accept(*arriving)
         self._timing.arrived(stamp)
-        now = self._state.time_ns
-        if self.lock_step and not self._holding and all(of == now for of in known):
+        if self.lock_step and not self._holding and not self.awaited()[1]:
             self._step()
             self._hold()
+
+    def awaited(self) -> tuple[int, list[str]]:
+        """Stamp of this tick [ns], and the legs whose targets have not come."""
+        now = self._state.time_ns
+        return now, [] if self._holding else [
+            f'joint_targets of {leg}' for leg in LEGS if self._arrived.get(leg) != now]
 
     def _on_push(self, message: Any) -> None:
         force, take = read_push_force(message), getattr(self._robot, 'take_push', None)

@@ -47,6 +47,9 @@ from dmp_cpg_ros.suite_table import POSTURE
 FORGOTTEN_NS = 300_000_000
 """Gap after which the estimator begins anew [ns]: the robot has come to a stand by itself."""
 
+NEVER_NS = 10**18
+"""Longest time between two messages of a rate that is hardly any [ns]: thirty years."""
+
 WELL_AGAIN_NS = 1_000_000_000
 """Time without a problem after which sensors count as well again [ns]."""
 
@@ -112,7 +115,7 @@ class BodyState:
         parameters = self._node.parameters_of(EstimationParameters)
         self._estimator.parameters = parameters
         rate = parameters.estimate_rate
-        self._period_ns = round(1e9 / rate) if rate > 0.0 else 0
+        self._period_ns = round(min(1e9 / rate, NEVER_NS)) if rate > 0.0 else 0
 
     def state(self, stamp_ns: int, values: Mapping[str, Any]) -> RobotState:
         """State at a stamp from what the topics said.

@@ -3,9 +3,10 @@
 """Targets that no leg sends: those that jump, and those that repeat while they move.
 
 Targets tell the same motion twice: over a time t an angle changes by the mean velocity times t. In
-walks on ``config/robots`` they have differed by 0.0012 rad in a tick of 4 ms at most, and by 0.03
-rad where a joint's velocity was at its limit. What breaks that by more is no motion: a robot that
-does not follow it goes on with the rhythm of its last cycle, as if the leg were silent, and stops.
+walks on ``config/robots`` they have differed by 0.0012 rad in a tick of 4 ms at most, but for joints
+whose angle or velocity was cut at its limit, which are not judged until they have caught up. What
+breaks that by more is no motion: a robot that does not follow it goes on with the rhythm of its last cycle, as if the leg
+were silent, and stops.
 
 The leg is believed again once its jumps have cancelled each other, as those of an offset that
 comes and goes, or once it rests: then it is somebody's step, and the robot stands.
@@ -13,6 +14,7 @@ comes and goes, or once it rests: then it is somebody's step, and the robot stan
 
 from __future__ import annotations
 
+from dmp_cpg_ros.core.robot_model.description import LegGeometry
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, JointTargets
 
 APART, PULL = 0.04, 1000.0
@@ -28,6 +30,12 @@ RESTING, RESTS_NS = 0.3, 100_000_000
 believed [ns].
 """
 
+NEAR = 1e-6
+"""Distance from a limit at which a target is cut at it [rad], [rad/s]."""
+
+CAUGHT_UP = 0.01
+"""Difference at which an angle that lagged behind its velocity has caught up [rad]."""
+
 NOTHING = [0.0] * len(JOINTS_OF_LEG)
 """No jump."""
 
@@ -37,6 +45,8 @@ class TargetWatch:
 
     Parameters
     ----------
+    leg : LegGeometry
+        The leg, for the limits of its joints.
     gap_ns : int
         Time without targets after which there is nothing to compare them with [ns].
 
@@ -46,10 +56,13 @@ class TargetWatch:
         Stamp of the last targets that were not believed [ns]; -1: none.
     """
 
-    def __init__(self, gap_ns: int) -> None:
+    def __init__(self, leg: LegGeometry, gap_ns: int) -> None:
         """Begin without targets."""
+        self._limits = list(zip(leg.position_lower.tolist(), leg.position_upper.tolist(),
+                                leg.velocity_limit.tolist(), strict=True))
         self._gap_ns, self._stamp_ns, self._uneasy_ns = gap_ns, -1, -1
         self._position = self._velocity = self._jumped = NOTHING
+        self._cut = [False] * len(JOINTS_OF_LEG)
         self.doubted_ns = -1
 
     def believes(self, stamp_ns: int, targets: JointTargets) -> bool:
@@ -81,10 +94,14 @@ class TargetWatch:
                rests: bool) -> list[float]:
         """Sum of the jumps [rad], with those since the last targets, a time dt [s] before."""
         most, total, jumps = APART + PULL * dt * dt, self._jumped, False
-        for i, (q, before, rate, rate_before) in enumerate(zip(
-                position, self._position, velocity, self._velocity, strict=True)):
+        for i, (q, before, rate, rate_before, (low, high, fastest)) in enumerate(zip(
+                position, self._position, velocity, self._velocity, self._limits, strict=True)):
             apart = q - before - 0.5 * dt * (rate + rate_before)
-            if apart > most or apart < -most:
+            self._cut[i] = (
+                min(abs(q - low), abs(q - high), abs(before - low), abs(before - high),
+                    abs(abs(rate) - fastest), abs(abs(rate_before) - fastest)) <= NEAR
+                or (self._cut[i] and not -CAUGHT_UP <= apart <= CAUGHT_UP))
+            if not (self._cut[i] or -most <= apart <= most):
                 jumps, total = True, [*total[:i], total[i] + apart, *total[i + 1:]]
         if jumps or not rests:
             self._uneasy_ns = stamp_ns

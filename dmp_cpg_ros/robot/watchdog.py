@@ -117,7 +117,7 @@ class CommandWatchdog:
                  tick_ns: int = 0) -> None:
         """Start without targets."""
         self._losses = [TargetLoss(tick_ns, timeout_ns) for _ in LEGS]
-        self._watches = [TargetWatch(timeout_ns) for _ in LEGS]
+        self._watches = [TargetWatch(leg, timeout_ns) for leg in description.legs]
         self._losing = False
         self._timeout_ns, self._lead_ns, self._targets = timeout_ns, lead_ns, np.zeros((3, 12))
         self.stamps: list[int | None] = [None] * len(LEGS)

@@ -10,22 +10,25 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.robot_model.state import JointTargets
+from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.target_watch import TargetWatch
 from dmp_cpg_ros.studies.failures import Case, drawn, trial
 
 TICK_NS, GAP_NS = 4_000_000, 200_000_000
 PERIOD_S = 0.5
+LEG = load_description().legs[0]
+MIDDLE = 0.5 * (LEG.position_lower + LEG.position_upper)
 
 
 def stride(k: int) -> JointTargets:
     """Targets of a leg that strides at the k-th tick."""
     phase = 2.0 * np.pi * 1e-9 * TICK_NS * k / PERIOD_S + np.arange(3)
-    return JointTargets(0.4 * np.sin(phase), 0.8 * np.pi / PERIOD_S * np.cos(phase), np.zeros(3))
+    return JointTargets(MIDDLE + 0.4 * np.sin(phase), 0.8 * np.pi / PERIOD_S * np.cos(phase), np.zeros(3))
 
 
 def believed(sent: Callable[[int], JointTargets | None], ticks: int) -> list[bool | None]:
     """Tell of each tick whether its targets were believed; None where none came."""
-    watch, seen = TargetWatch(GAP_NS), []
+    watch, seen = TargetWatch(LEG, GAP_NS), []
     for k in range(ticks):
         targets = sent(k)
         seen.append(None if targets is None else watch.believes(k * TICK_NS, targets))
@@ -64,7 +67,7 @@ def test_an_offset_that_stays_is_believed_once_the_leg_rests() -> None:
 
 def test_what_tells_anything_is_not_believed() -> None:
     random = np.random.default_rng(3)
-    wild = [JointTargets(2.0 * random.standard_normal(3), *np.zeros((2, 3)))
+    wild = [JointTargets(MIDDLE + 2.0 * random.standard_normal(3), *np.zeros((2, 3)))
             for _ in range(200)]
     seen = believed(lambda k: wild[k - 100] if 100 <= k < 300 else stride(k), 300)
     assert not any(seen[100:])
@@ -80,7 +83,7 @@ def test_what_repeats_while_it_moves_is_not_believed_and_what_rests_is() -> None
 
 def test_a_step_of_a_leg_that_rests_is_believed_after_a_moment() -> None:
     seen = believed(
-        lambda k: JointTargets(np.full(3, 0.3 * (k >= 100)), *np.zeros((2, 3))), 300)
+        lambda k: JointTargets(MIDDLE + 0.3 * (k >= 100), *np.zeros((2, 3))), 300)
     assert all(seen[:100])
     assert not any(seen[100:124])
     assert all(seen[126:])
@@ -95,3 +98,18 @@ def test_failures_that_made_a_walk_fall_do_not(cell: tuple[str, str, str], seed:
     outcome = trial(drawn(cell, seed, [Case._field_defaults['robot']]))
     assert outcome.end != 'falls'
     assert outcome.named
+
+
+def test_a_joint_whose_targets_were_cut_at_a_limit_is_not_judged_until_it_has_caught_up() -> None:
+    fast, step = 1.5 * LEG.velocity_limit[2], 2.0 * LEG.velocity_limit[2] * 1e-9 * TICK_NS
+    wanted = MIDDLE[2] + fast * 1e-9 * TICK_NS * np.clip(np.arange(40) - 5, 0, 6)
+    told = [MIDDLE[2]]
+    for goal in wanted[1:]:
+        told.append(told[-1] + min(goal - told[-1], step if len(told) > 8 else 0.5 * step))
+
+    def sent(k: int) -> JointTargets:
+        rate = LEG.velocity_limit[2] * (5 < k < 9) + 0.1 * (k >= 9)
+        return JointTargets(np.array((*MIDDLE[:2], told[k])), np.array((0.0, 0.0, rate)),
+                            np.zeros(3))
+
+    assert all(believed(sent, 40))

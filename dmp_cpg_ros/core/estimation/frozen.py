@@ -37,9 +37,9 @@ FROZEN_NS = 50_000_000
 """Time over which readings repeat before they count as frozen [ns]."""
 
 JUMP, STEADY_NS = 8.0, 100_000_000
-"""Change of a turn rate in a tick that is none [rad/s], and for how long it must not have jumped
-to be believed [ns]: of what tells anything, a reading now and then lies near the truth. One that
-froze must not have repeated for as long: what is new now and then mostly tells what was.
+"""Change of a turn rate in a tick that is none [rad/s], and for how long a sensor must not have
+repeated itself that was frozen, or jumped, to be believed [ns]: what is new now and then mostly
+tells what was, and of what tells anything a reading now and then lies near the truth.
 """
 
 APART, PULL, JOINTS_NS = 0.06, 2500.0, 600_000_000
@@ -109,8 +109,8 @@ class SensorWatch:
         Stamp from which on the IMU, each leg's encoders and each contact repeat; −1: they do not.
     joint_position : ndarray (12,)
         Last usable angles [rad].
-    imu_doubted_ns : int
-        Stamp at which the IMU last jumped, or repeated itself after it froze [ns]; −1: none.
+    until_ns : tuple of int
+        Stamps until which these are not believed; −1: they were never in doubt.
     heard_ns : tuple of 12 int
         Stamps at which each joint's angle was new [ns].
     usual : ndarray (12,)
@@ -122,21 +122,21 @@ class SensorWatch:
     readings: SensorReadings
     since_ns: tuple[int, ...]
     joint_position: Array
-    imu_doubted_ns: int
+    until_ns: tuple[int, ...]
     heard_ns: tuple[int, ...]
     usual: Array
     doubt: Doubt
 
 
-NOT_REPEATED = (-1,) * (1 + 2 * N)
-"""Stamps of sensors none of which repeats itself."""
+NEVER = (-1,) * (1 + 2 * N)
+"""Stamps of sensors none of which repeats itself, or is in doubt."""
 
 
 def first_watch(readings: SensorReadings) -> SensorWatch:
     """Memory after the first readings."""
     usable = np.where(np.isfinite(readings.joint_position), readings.joint_position, 0.0)
     now = readings.time_ns
-    return SensorWatch(readings, NOT_REPEATED, usable, -1, (now,) * (3 * N), usable, NOBODY)
+    return SensorWatch(readings, NEVER, usable, NEVER, (now,) * (3 * N), usable, NOBODY)
 
 
 def without_frozen(watch: SensorWatch, readings: SensorReadings
@@ -146,7 +146,7 @@ def without_frozen(watch: SensorWatch, readings: SensorReadings
     doubt = watch.doubt
     if jumps or any(doubt.legs):
         doubt = _in_doubt(watch, readings, jumps)
-    told, since, doubted_ns, passed = _without_repeated(watch, readings)
+    told, since, until, passed = _without_repeated(watch, readings)
     if any(doubt.legs):
         passed = _without(passed, doubt.all_at_once, doubt.legs, doubt.all_at_once)
     known = _known(watch, passed)
@@ -154,7 +154,7 @@ def without_frozen(watch: SensorWatch, readings: SensorReadings
         known - watch.usual)
     if any(doubt.legs):
         usual = np.where(np.repeat(doubt.legs, 3), watch.usual, usual)
-    return SensorWatch(told, since, known, doubted_ns, heard, usual, doubt), passed
+    return SensorWatch(told, since, known, until, heard, usual, doubt), passed
 
 
 def _heard(watch: SensorWatch, readings: SensorReadings
@@ -208,37 +208,37 @@ def _share(dt: float) -> float:
     return min(dt / USUAL_S, 1.0)
 
 
-def _without_repeated(watch: SensorWatch, readings: SensorReadings
-                      ) -> tuple[SensorReadings, tuple[int, ...], int, SensorReadings]:
+def _without_repeated(watch: SensorWatch, readings: SensorReadings) -> tuple[
+        SensorReadings, tuple[int, ...], tuple[int, ...], SensorReadings]:
     """Without those of sensors that repeat themselves, and of a gyroscope that jumps: what to
-    compare the next ones with, since when what repeats, when the IMU was in doubt, and the
+    compare the next ones with, since when what repeats, until when what is in doubt, and the
     readings.
     """
-    last, now = watch.readings, readings.time_ns
+    last, now, until = watch.readings, readings.time_ns, watch.until_ns
     turning, before = triple(readings.rate_in_base.tolist()), triple(last.rate_in_base.tolist())
-    change, doubted_ns = minus(turning, before), watch.imu_doubted_ns
+    change = minus(turning, before)
     if max(change) > JUMP or min(change) < -JUMP:
-        doubted_ns = now
-    doubted = doubted_ns >= 0 and now - doubted_ns < STEADY_NS
+        until = (now + STEADY_NS, *until[1:])
     rates, q = readings.joint_velocity, readings.joint_position
     repeated, force = q == last.joint_position, _repeated_forces(readings, last)
     # A simulated body may ride level, without any noise.
     imu = turning[0] == before[0] and all(turning)
-    if not (doubted or imu or np.count_nonzero(repeated) or any(force)):  # as it always is
-        return readings, NOT_REPEATED, doubted_ns, readings
+    if not (imu or np.count_nonzero(repeated) or any(force) or (
+            until is not NEVER and max(until) > now)):  # as it always is
+        return readings, NEVER, NEVER, readings
     imu = imu and np.array_equal(readings.rate_in_base, last.rate_in_base) and np.array_equal(
         readings.specific_force_in_base, last.specific_force_in_base)
     legs = (repeated & (rates == last.joint_velocity)).reshape(N, 3).all(axis=1)
     moves = np.abs(np.nan_to_num(rates)).max() > MOVING  # also those say so that are frozen
     since = tuple((begun if begun >= 0 else now) if same and moves else -1
                   for begun, same in zip(watch.since_ns, [imu, *legs, *force], strict=True))
-    frozen = [begun >= 0 and now - begun >= FROZEN_NS for begun in since]
-    if frozen[0] or (doubted and since[0] >= 0):
-        doubted, doubted_ns = True, now
-    passed = readings
-    if doubted or any(frozen):
-        passed = _without(readings, doubted, frozen[1:1 + N], frozen[1 + N:])
-    return _told(watch, readings, now), since, doubted_ns, passed
+    until = tuple(
+        now + STEADY_NS if begun >= 0 and (end > now or now - begun >= FROZEN_NS) else end
+        for begun, end in zip(since, until, strict=True))
+    doubted = [end > now for end in until]
+    passed = _without(readings, doubted[0], doubted[1:1 + N], doubted[1 + N:]) if any(
+        doubted) else readings
+    return _told(watch, readings, now), since, until, passed
 
 
 def _repeated_forces(readings: SensorReadings, last: SensorReadings) -> list[bool]:

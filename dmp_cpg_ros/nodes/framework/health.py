@@ -235,6 +235,9 @@ ASK_AGAIN_S = 0.25, 2.0
 NO_ANSWER = 'it does not answer'
 """What is said of nodes that say nothing."""
 
+FAILED, LACKS = 'it failed in its tick at', 'it waits in its tick at'
+"""What a node adds to its answer whose tick has not ended, before the time."""
+
 
 class Intervals:
     """Growing intervals of wall time at which someone who waits says what for.
@@ -268,6 +271,11 @@ class ReadinessOfOthers:
         Who asks.
     names : iterable of str
         Names of nodes in its namespace.
+
+    Attributes
+    ----------
+    said : dict of str to str
+        What they answered last.
     """
 
     def __init__(self, node: Node, names: Iterable[str]) -> None:
@@ -275,18 +283,18 @@ class ReadinessOfOthers:
         self._node = node
         self._clients = {name: node.create_client(Trigger, f'{name}/ready') for name in names}
         self._asked: dict[str, tuple[float, float, Future]] = {}
-        self._said: dict[str, str] = {}
+        self.said: dict[str, str] = {}
 
     def missing(self) -> list[str]:
         """Take answers and ask again, without waiting; returns who has not said yes, and why."""
         for name, client in list(self._clients.items()):
             asked_s, patience_s, future = self._asked.get(name, (-math.inf, 0.0, Future()))
             answer = future.result() if future.done() else None
+            if answer is not None:
+                self.said[name] = answer.message
             if answer is not None and answer.success:
                 self._node.destroy_client(self._clients.pop(name))
                 continue
-            if answer is not None:
-                self._said[name] = answer.message
             # A response is lost where the server does not know the client yet; it is late where
             # the machine is busy, and then the next one is waited for longer.
             now, (first_s, most_s) = time.monotonic(), ASK_AGAIN_S
@@ -295,7 +303,7 @@ class ReadinessOfOthers:
                 client.remove_pending_request(future)
                 self._asked[name] = (now, max(first_s, patience_s),
                                      client.call_async(Trigger.Request()))
-        return [f'{name}: {self._said.get(name, NO_ANSWER)}' for name in self._clients]
+        return [f'{name}: {self.said.get(name, NO_ANSWER)}' for name in self._clients]
 
     def end(self) -> None:
         """Ask no more."""

@@ -24,7 +24,7 @@ from dmp_cpg_ros.nodes.framework import parameters
 from dmp_cpg_ros.nodes.framework.certified import Certified
 from dmp_cpg_ros.nodes.framework.changes import ParameterChanges
 from dmp_cpg_ros.nodes.framework.connected_node import ConnectedNode
-from dmp_cpg_ros.nodes.framework.health import missing_connections
+from dmp_cpg_ros.nodes.framework.health import FAILED, LACKS, missing_connections
 from dmp_cpg_ros.nodes.framework.ticks import TickInputs, drain
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.values import header_ns
@@ -77,6 +77,7 @@ class SuiteNode(ConnectedNode):
     certified: Certified | None = None
     inputs: TickInputs
     elapsed = 0.0
+    _failed = ''
 
     def __init__(self, name: str | None = None, **options: Any) -> None:
         """Create the node and check its parameters; raises ParameterError for a bad one."""
@@ -245,9 +246,26 @@ class SuiteNode(ConnectedNode):
     def _run_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         self.elapsed = self._clock_of_ticks.step(stamp_ns)
         self._said.clear()
-        self.begin_tick(stamp_ns)
-        self.on_tick(stamp_ns, values)
-        self.end_tick()
+        try:
+            self.begin_tick(stamp_ns)
+            self.on_tick(stamp_ns, values)
+            self.end_tick()
+        except Exception as error:
+            self._failed = f'{FAILED} {stamp_ns * 1e-9:.3f} s: {type(error).__name__}: {error}'
+            raise
+        self._failed = ''
+
+    def unfinished(self) -> str:
+        """In lock-step, where nobody goes on: what the tick lacks that has not ended, or how it
+        failed; else empty.
+        """
+        stamp_ns, lacking = self.awaited() if self.lock_step and self.active else (-1, [])
+        return self._failed or (lacking and f'{LACKS} {stamp_ns * 1e-9:.3f} s of '
+                                f'{", ".join(lacking)}' or '')
+
+    def awaited(self) -> tuple[int, list[str]]:
+        """Stamp of the tick that has begun and cannot end [ns], and what it lacks."""
+        return self.inputs.awaited() if hasattr(self, 'inputs') else (-1, [])
 
     def _repeat(self) -> None:
         """Publish the last tick's messages again, for a node that was restarted meanwhile."""
@@ -278,5 +296,5 @@ class SuiteNode(ConnectedNode):
         problems = self.missing() if self.active else [
             f'{self.get_name()} is {self.state_label}']
         response.success = not problems
-        response.message = '; '.join(problems) or 'ready'
+        response.message = '; '.join(filter(None, (*(problems or ['ready']), self.unfinished())))
         return response

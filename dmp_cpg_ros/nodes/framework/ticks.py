@@ -150,6 +150,16 @@ class TickInputs:
             self.add(*message)
         return True
 
+    def awaited(self) -> tuple[int, list[str]]:
+        """Stamp of the oldest tick that is not complete [ns], and the inputs that it lacks; −1
+        where there is none.
+        """
+        if not self._pending:
+            return -1, []
+        stamp, last = min(self._pending), self.last_ns
+        return stamp, [name for name in self._inputs if name not in self._pending[stamp]] + [
+            name for name in self._delayed if last is not None and last not in self._late[name]]
+
     def newest_ns(self, name: str) -> int:
         """Newest stamp of an input [ns]; −1 without any."""
         return self._newest.get(name, (-1, None))[0]
