@@ -86,8 +86,9 @@ def find_config(name: str | Path, folder: str = '') -> Path:
     raise MissingFileError(_not_found(name, meant, places))
 
 
-_KINDS = ((stat.S_ISDIR, 'a folder'), (stat.S_ISFIFO, 'a pipe'), (stat.S_ISSOCK, 'a socket'),
-          (stat.S_ISCHR, 'a device'), (stat.S_ISBLK, 'a device'))
+_FOLDER, _PIPE = 'is a folder', 'is a pipe'
+_KINDS = ((stat.S_ISDIR, _FOLDER), (stat.S_ISFIFO, _PIPE), (stat.S_ISSOCK, 'is a socket'),
+          (stat.S_ISCHR, 'is a device'), (stat.S_ISBLK, 'is a device'))
 
 
 def other_than_file(path: str | Path) -> str:
@@ -96,7 +97,48 @@ def other_than_file(path: str | Path) -> str:
         mode = os.stat(path).st_mode
     except (OSError, ValueError):
         return ''
-    return next((f'is {kind}' for holds, kind in _KINDS if holds(mode)), '')
+    return next((kind for holds, kind in _KINDS if holds(mode)), '')
+
+
+def readable(path: str | Path) -> Path:
+    """Path of a file that a user names, which is about to be read to its end.
+
+    A pipe without a writer is waited for, and a device such as ``/dev/zero`` has no end.
+
+    Parameters
+    ----------
+    path : str or Path
+        Need not exist: to open it then fails by itself.
+
+    Raises
+    ------
+    MissingFileError
+        If it is, or links to, a folder, a pipe, a socket or a device.
+    """
+    if kind := other_than_file(path):
+        raise MissingFileError(f"'{path}' {kind}, not a file")
+    return Path(path)
+
+
+def writable(path: str | Path) -> Path:
+    """Path that a user names, which is about to be written.
+
+    What is open already may be: ``/dev/stdout``, also into a pipe, and the shell's ``>(...)``.
+
+    Parameters
+    ----------
+    path : str or Path
+        Need not exist.
+
+    Raises
+    ------
+    MissingFileError
+        If it is, or links to, a folder, or a pipe by name: to open that waits for a reader.
+    """
+    kind = other_than_file(path)
+    if kind == _FOLDER or kind == _PIPE and os.path.exists(os.path.realpath(path)):
+        raise MissingFileError(f"'{path}' {kind}, not a file to write")
+    return Path(path)
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
@@ -143,7 +185,7 @@ def load_yaml(path: str | Path) -> dict[str, Any]:
     DataError
         If it is too large, not YAML, or not a mapping; the text names the line.
     """
-    path = Path(path)
+    path = readable(path)
     try:
         with path.open('rb') as file:
             data = file.read(LARGEST_FILE + 1)

@@ -13,7 +13,7 @@ import numpy as np
 import yaml
 
 from dmp_cpg_ros import configuration
-from dmp_cpg_ros.configuration import find_config, load_yaml, naming
+from dmp_cpg_ros.configuration import find_config, load_yaml, naming, writable
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 from dmp_cpg_ros.core.parameters import check_names, shown
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
@@ -81,7 +81,7 @@ def save_primitive(primitive: Primitive, path: str | Path) -> None:
     arrays = (spring.stiffness, spring.damping, bases.centres, bases.widths, primitive.weights)
     content.update({name: array.tolist() for name, array in zip(_SHARED, arrays, strict=True)})
     text = of.head + yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=99)
-    path = Path(path)
+    path = writable(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding='utf-8')

@@ -27,7 +27,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 from dmp_cpg_ros.analysis.rescue import PACKED_SUFFIX, Unpacker, closed, ros_part, told, unpacked
-from dmp_cpg_ros.configuration import load_yaml, naming
+from dmp_cpg_ros.configuration import load_yaml, naming, readable
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, MissingFileError
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -51,14 +51,15 @@ def find_bag(path: Path | str) -> Path:
     Raises
     ------
     MissingFileError
-        If the path does not exist.
+        If the path does not exist, or is a pipe or a device.
     DataError
         If there is no bag.
     """
     path = Path(path)
     if not path.exists():
         raise MissingFileError(f"'{path}' does not exist; name a bag's or a run's folder")
-    if path.is_file():
+    if not path.is_dir():
+        readable(path)
         if _is_storage(path):
             return path
         if path.suffix == '.yaml':
@@ -245,6 +246,8 @@ def _parts(bag: Path) -> list[Path]:
     files = [bag] if bag.is_file() else _storage_files(bag)
     if not files:
         raise DataError(f"'{bag}' cannot be read: it has metadata, but no *.mcap and no *.db3")
+    for file in files:
+        readable(file)
     with suppress(DmpCpgError, LookupError, TypeError):
         described = load_yaml(bag / 'metadata.yaml')['rosbag2_bagfile_information']
         named = [bag / PurePath(name).name for name in described['relative_file_paths']]

@@ -23,6 +23,7 @@ from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.strict_json import to_json
 from dmp_cpg_ros.analysis.tables import as_text, flattened
+from dmp_cpg_ros.configuration import writable
 
 _log = logging.getLogger(__name__)
 
@@ -51,7 +52,7 @@ def write_figures(recording: Recording, context: RunContext, folder: Path) -> di
     folder.mkdir(parents=True, exist_ok=True)
     written = {}
     for draw in CATALOGUE:
-        file = folder / f'{draw.__name__}.png'
+        file = writable(folder / f'{draw.__name__}.png')
         try:
             with style.applied():
                 figure = draw(recording, context)

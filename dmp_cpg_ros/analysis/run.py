@@ -22,6 +22,7 @@ from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import held, roll_pitch_yaw, stretches
 from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.analysis.strict_json import plain, read_json, write_json
+from dmp_cpg_ros.configuration import writable
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Draw = Callable[[Array, Array, Array], Sequence[NDArray[np.uint8]]]
@@ -97,7 +98,7 @@ def _draw_pictures(scenes: Sequence[tuple[Moment, Pose]], folder: Path, draw: Dr
     folder.mkdir(parents=True, exist_ok=True)
     written = {}
     for (moment, _), picture in zip(scenes, pictures, strict=False):
-        path = folder / f'{moment.name}.png'
+        path = writable(folder / f'{moment.name}.png')
         image.imsave(path, picture)
         written[moment.name] = (path, moment.caption)
     return written
@@ -204,7 +205,7 @@ def write_results(
     scenes = [] if draw is None else _scenes(recording, context)
     del recording  # an hour's arrays and the drawing together would take too much memory
     pictures = {} if draw is None else _draw_pictures(scenes, folder / 'figures', draw)
-    page = folder / 'report.html'
+    page = writable(folder / 'report.html')
     page.write_text(render(*headings, metrics, facts, figures, pictures, told), encoding='utf-8')
     return RunResults(folder, metrics, facts, page, pictures)
 

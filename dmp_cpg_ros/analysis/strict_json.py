@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.configuration import readable, writable
+from dmp_cpg_ros.core.errors import DataError, MissingFileError
 
 
 def plain(value: Any) -> Any:
@@ -42,6 +43,7 @@ def to_json(value: Any) -> str:
 def write_json(path: Path, value: Any) -> None:
     """Write strict JSON as UTF-8; a file that was there is replaced as a whole, or stays."""
     text = to_json(value)
+    path = writable(path)
     if path.exists() and not path.is_file():  # such as /dev/stdout
         path.write_text(text, encoding='utf-8')
         return
@@ -63,10 +65,10 @@ def read_json(path: Path) -> dict[str, Any]:
         If there is one that cannot be read.
     """
     try:
-        content = json.loads(path.read_text(encoding='utf-8'))
+        content = json.loads(readable(path).read_text(encoding='utf-8'))
     except (FileNotFoundError, NotADirectoryError):
         return {}
-    except (OSError, ValueError, RecursionError) as error:
+    except (MissingFileError, OSError, ValueError, RecursionError) as error:
         raise DataError(f"'{path}' cannot be read: {error}; repair or remove it") from None
     if not isinstance(content, dict):
         raise DataError(f"'{path}' must hold an object of JSON; repair or remove it")

@@ -11,6 +11,7 @@ from typing import Any
 
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.configuration import writable
 from dmp_cpg_ros.core.errors import MissingFileError
 
 AT_ONCE = 10_000
@@ -21,7 +22,7 @@ def write_csv(recording: Recording, folder: Path) -> None:
     """Write ``NAME.csv`` of each table, with a line of names of columns."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, columns in recording.tables().items():
-        with (folder / f'{name}.csv').open('w', encoding='utf-8', newline='') as file:
+        with writable(folder / f'{name}.csv').open('w', encoding='utf-8', newline='') as file:
             write = csv.writer(file)
             write.writerow(columns)
             for first in range(0, len(columns['time_s']), AT_ONCE):
@@ -39,7 +40,7 @@ def write_parquet(recording: Recording, folder: Path) -> None:
             "Parquet needs the package pyarrow: pip install 'dmp_cpg_ros[parquet]'") from error
     folder.mkdir(parents=True, exist_ok=True)
     for name, columns in recording.tables().items():
-        parquet.write_table(table(columns), folder / f'{name}.parquet')
+        parquet.write_table(table(columns), writable(folder / f'{name}.parquet'))
 
 
 def side_by_side(runs: Mapping[str, Mapping[str, Any]]) -> tuple[list[str], list[list[Any]]]:

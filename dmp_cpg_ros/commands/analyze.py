@@ -32,6 +32,7 @@ from dmp_cpg_ros.analysis.tables import (
 )
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.commands.run_folder import picture_taker, run_context, run_of
+from dmp_cpg_ros.configuration import writable
 from dmp_cpg_ros.core.errors import ParameterError
 
 BAG_ALONE = {'note': 'made from a bag alone: versions, commit and host are those of the analysis'}
@@ -182,7 +183,7 @@ def _compare(options: argparse.Namespace) -> int:
     print(table)
     if options.out is not None:
         options.out.mkdir(parents=True, exist_ok=True)
-        (options.out / 'comparison.md').write_text(f'{table}\n', encoding='utf-8')
+        writable(options.out / 'comparison.md').write_text(f'{table}\n', encoding='utf-8')
         write_json(options.out / 'comparison.json', runs)
     return 0
 

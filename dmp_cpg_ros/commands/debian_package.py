@@ -21,6 +21,7 @@ from typing import Any
 from zipfile import ZipFile
 
 from dmp_cpg_ros.commands.ros_arguments import run_command
+from dmp_cpg_ros.configuration import readable
 from dmp_cpg_ros.core.errors import MissingFileError
 
 DISTRIBUTION, PREFIX, PYTHON = 'jazzy', 'opt/ros/jazzy', 'python3.12'
@@ -73,7 +74,7 @@ def control(manifest: ElementTree.Element) -> str:
 def lay_out(wheel: Path, root: Path) -> ElementTree.Element:
     """Write a package's files as they are to lie below a root; returns its package.xml."""
     prefix = root / PREFIX
-    with ZipFile(wheel) as archive:
+    with ZipFile(readable(wheel)) as archive:
         names = archive.namelist()
         (info,) = {name.split('/')[0] for name in names if '.dist-info/' in name}
         (package,) = archive.read(f'{info}/top_level.txt').decode().split()

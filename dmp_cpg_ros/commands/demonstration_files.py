@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis import bag
 from dmp_cpg_ros.analysis.loading import table_of
 from dmp_cpg_ros.analysis.topics import AT_ONCE, Block, Topic
-from dmp_cpg_ros.configuration import naming
+from dmp_cpg_ros.configuration import naming, readable
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, MissingFileError
+from dmp_cpg_ros.core.parameters import shown
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 
 _TIME_NAMES = ('t', 'time', 'time_s', 'timestamp', 'stamp')
@@ -72,9 +73,9 @@ def _read(path: Path, joints: Sequence[str], topic: str, start: float | None, en
         raise MissingFileError(f"'{path}' does not exist; name a CSV, .npy or .npz file or a bag")
     suffix = path.suffix.lower()
     if suffix == '.csv':
-        whole = _from_csv(path)
+        whole = _from_csv(readable(path))
     elif suffix in ('.npy', '.npz'):
-        whole = _from_numpy(path)
+        whole = _from_numpy(readable(path))
     elif path.is_dir() or suffix in ('.mcap', '.db3'):
         whole = _from_bag(path, topic, joints)
     else:
@@ -103,6 +104,16 @@ def _check_joints(path: Path, joints: Iterable[str], known: Collection[str]) -> 
             raise DataError(f"'{path}' has no joint '{name}'; valid are {valid}")
 
 
+def _check_named_once(path: Path, names: Sequence[str]) -> None:
+    """Raise DataError for a name that is empty or stands twice: its numbers would be no one's."""
+    for place, name in enumerate(names):
+        if not name:
+            raise DataError(f"'{path}' has no name for column {place + 1}; every column needs one")
+        if name in names[:place]:
+            raise DataError(f"'{path}' names two columns {shown(name)}; every column needs a name "
+                            'of its own')
+
+
 def _from_csv(path: Path) -> Demonstration:
     """Columns by name: time, NAME, and NAME_velocity, NAME_acceleration where they exist."""
     try:
@@ -117,6 +128,7 @@ def _from_csv(path: Path) -> Demonstration:
         header = ['time', *(f'joint_{i}' for i in range(1, len(rows[0])))]
     except ValueError:
         header, rows = [cell.strip() for cell in rows[0]], rows[1:]
+    _check_named_once(path, header)
     if len(header) < 2 or header[0].lower() not in _TIME_NAMES:
         raise DataError(
             f"'{path}' must have the time in its first column, named {', '.join(_TIME_NAMES)}, "
@@ -161,6 +173,7 @@ def _from_numpy(path: Path) -> Demonstration:
             raise DataError(f"'{path}' has no array '{needed}'; needed are times, positions, "
                             'possible velocities, accelerations, names')
     names = tuple(map(str, arrays.pop('names', np.array([])).ravel()))
+    _check_named_once(path, names)
     return Demonstration(**arrays, names=names)
 
 

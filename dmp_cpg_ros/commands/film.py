@@ -22,8 +22,15 @@ from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import held, smoothed, velocity_in_heading
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.strict_json import read_json
-from dmp_cpg_ros.commands.ros_arguments import RosArguments, positive, run_command
+from dmp_cpg_ros.commands.ros_arguments import (
+    RosArguments,
+    number,
+    run_command,
+    whole_within,
+    within,
+)
 from dmp_cpg_ros.commands.run_folder import run_context
+from dmp_cpg_ros.configuration import writable
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.robot.camera import Camera
 
@@ -42,6 +49,9 @@ what stands still from flickering.
 
 ENCODER, MP4_QUALITY = 'imageio_ffmpeg', 7
 """The module that encodes MP4, and the quality, from 0 to 10."""
+
+RATES, WIDTHS = (0.1, 240.0), (32, 3840)
+"""Frames per second and widths [pixels] that may be asked for, least and most."""
 
 
 @dataclass(frozen=True)
@@ -160,13 +170,15 @@ def checked_film_path(path: Path) -> Path:
     ------
     ParameterError
         If its ending is neither ``.gif`` nor ``.mp4``, or nothing here encodes MP4.
+    MissingFileError
+        If it is no file to write.
     """
     if path.suffix.lower() not in ('.gif', '.mp4'):
         raise ParameterError(f"a film must end in .gif or .mp4, not '{path.name}'")
     if path.suffix.lower() == '.mp4' and not has_encoder():
         raise ParameterError(
             f"'{path.name}' needs an encoder: pip install imageio-ffmpeg; a .gif needs none")
-    return path
+    return writable(path)
 
 
 def write_film(path: Path, frames: Iterator[Frame], palette_from: list[Frame], fps: float) -> None:
@@ -213,16 +225,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add('run', metavar='RUN', type=Path, help="a run's folder, with bag/ inside")
     add('film', metavar='FILE', type=Path,
         help='FILE.gif, or FILE.mp4 when imageio-ffmpeg is installed')
-    add('--start', metavar='S', type=float, default=Shot.start, help="begin, on the robot's clock")
-    add('--end', metavar='S', type=float, default=Shot.end, help='end')
-    add('--fps', metavar='HZ', type=positive, default=Shot.fps,
-        help='frames per second (default: %(default)g)')
-    add('--width', metavar='PIXELS', type=int, default=Shot.width,
-        help='width, of 16:9 (default: %(default)s)')
+    add('--start', metavar='S', type=number, default=Shot.start,
+        help="begin, on the robot's clock")
+    add('--end', metavar='S', type=number, default=Shot.end, help='end')
+    add('--fps', metavar='HZ', type=within(*RATES), default=Shot.fps,
+        help='frames per second, {:g} to {:g} (default: %(default)g)'.format(*RATES))
+    add('--width', metavar='PIXELS', type=whole_within(*WIDTHS), default=Shot.width,
+        help='width, {} to {}, of 16:9 (default: %(default)s)'.format(*WIDTHS))
     return run_command(parser, arguments, _film)
 
 
 def _film(options: argparse.Namespace, _: RosArguments) -> int:
+    checked_film_path(options.film)
     height = 2 * round(options.width * 9 / 32)
     shot = Shot(options.start, options.end, options.fps, options.width, height)
     frames = film_run(options.run, options.film, shot)

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.configuration import writable
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.model_inspection import Inspection, inspect_model
@@ -41,18 +42,18 @@ def _inspect(options: argparse.Namespace, _: RosArguments) -> int:
     if options.output is None:
         print(robot_yaml(found, name=asked), end='')
     else:
-        options.output.write_text(
+        writable(options.output).write_text(
             robot_yaml(found, options.output.parent, asked), encoding='utf-8')
     if options.urdf is not None:
         from dmp_cpg_ros.robot.urdf import urdf
 
-        options.urdf.write_text(urdf(found.file), encoding='utf-8')
+        writable(options.urdf).write_text(urdf(found.file), encoding='utf-8')
     if options.picture is not None:
         from matplotlib import image
 
         from dmp_cpg_ros.robot.camera import leg_picture
 
-        image.imsave(options.picture, leg_picture(found.file))
+        image.imsave(writable(options.picture), leg_picture(found.file))
     print(summary(found), file=sys.stderr if options.output is None else sys.stdout)
     return 0
 

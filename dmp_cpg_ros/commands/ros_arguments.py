@@ -144,6 +144,28 @@ def positive(text: str) -> float:
     return value
 
 
+def within(least: float, most: float) -> Callable[[str], float]:
+    """Type of an argument: a number between two others, or one of them."""
+    def limited(text: str) -> float:
+        value = number(text)
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f'{text} must be from {least:g} to {most:g}')
+        return value
+
+    return limited
+
+
+def whole_within(least: int, most: int) -> Callable[[str], int]:
+    """Type of an argument: a whole number between two others, or one of them."""
+    def limited(text: str) -> int:
+        value = within(least, most)(text)
+        if not value.is_integer():
+            raise argparse.ArgumentTypeError(f'{text} must be a whole number')
+        return int(value)
+
+    return limited
+
+
 def read_pair(text: str) -> tuple[str, str]:
     """Read ``NAME:=VALUE``; raises ParameterError when it is no such pair."""
     name, separator, value = text.partition(':=')

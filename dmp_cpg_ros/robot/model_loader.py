@@ -7,16 +7,15 @@ world of :mod:`dmp_cpg_ros.core.robot_model.world` under it.
 from __future__ import annotations
 
 import logging
-import re
 import warnings
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from dmp_cpg_ros.configuration import other_than_file
+from dmp_cpg_ros.configuration import readable
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
 from dmp_cpg_ros.core.robot_model.grounds import Surface, World
+from dmp_cpg_ros.robot.model_text import check_text
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 
 _log = logging.getLogger(__name__)
@@ -64,15 +63,11 @@ def load_model(path: Path, base: str, world: World | None = None) -> mujoco.MjMo
     MissingFileError
         If there is no such file.
     ParameterError
-        If MuJoCo cannot compile it, or a file that it names is a pipe or a device.
+        If MuJoCo cannot compile it, or as :func:`~dmp_cpg_ros.robot.model_text.check_text`.
     """
-    if not path.is_file():
-        kind = other_than_file(path)
-        raise MissingFileError(
-            f"model '{path}' {f'{kind}, not a file' if kind else 'does not exist'}")
-    for named in _named_files(path, set()):  # from a pipe or a device MuJoCo would read for ever
-        if (kind := other_than_file(named)) and not named.is_dir():
-            raise ParameterError(f"model '{path}' names '{named}', which {kind}, not a file")
+    if not readable(path).exists():
+        raise MissingFileError(f"model '{path}' does not exist")
+    check_text(path)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         if not any(geom.type in (_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
@@ -102,20 +97,6 @@ def load_model(path: Path, base: str, world: World | None = None) -> mujoco.MjMo
     model.opt.iterations = max(model.opt.iterations, LEAST_ITERATIONS)
     model.opt.ls_iterations = max(model.opt.ls_iterations, LEAST_SEARCHES)
     return model
-
-
-def _named_files(path: Path, read: set[Path], folders: tuple[Path, ...] = ()) -> Iterator[Path]:
-    """Where files may be that a model and those that it includes name."""
-    read.add(path.resolve())
-    text = path.read_text(encoding='utf-8', errors='replace')
-    folders = (*(folders or (path.parent,)), path.parent)
-    folders = tuple(dict.fromkeys((*folders, *(folders[0] / name for name in re.findall(
-        r"""\b(?:mesh|texture|asset)dir\s*=\s*["']([^"'\0]*)""", text)))))
-    for name in re.findall(r"""\bfile\w*\s*=\s*["']([^"'\0]+)""", text):
-        for place in dict.fromkeys(folder / name for folder in folders):
-            yield place
-            if place.suffix == '.xml' and place.is_file() and place.resolve() not in read:
-                yield from _named_files(place, read, folders)
 
 
 def _add_floor(spec: mujoco.MjSpec) -> None:

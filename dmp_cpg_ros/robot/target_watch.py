@@ -3,10 +3,10 @@
 """Targets that no leg sends: those that jump, and those that repeat while they move.
 
 Targets tell the same motion twice: over a time t an angle changes by the mean velocity times t. In
-walks on ``config/robots`` they have differed by 0.0012 rad in a tick of 4 ms at most, but for joints
-whose angle or velocity was cut at its limit, which are not judged until they have caught up. What
-breaks that by more is no motion: a robot that does not follow it goes on with the rhythm of its last cycle, as if the leg
-were silent, and stops.
+walks on ``config/robots`` they have differed by 0.0012 rad in a tick of 4 ms at most, but for
+joints whose angle or velocity was cut at its limit, which are not judged until they have caught
+up. What breaks that by more is no motion: a robot that does not follow it goes on with the rhythm
+of its last cycle, as if the leg were silent, and stops.
 
 The leg is believed again once its jumps have cancelled each other, as those of an offset that
 comes and goes, or once it rests: then it is somebody's step, and the robot stands.

@@ -23,6 +23,8 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.configuration import readable
 from dmp_cpg_ros.core.canonical.inhibition import AUTO
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -145,7 +147,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--record', type=Path, help='Markdown file to add the counts to')
     parser.add_argument('--auto', action='store_true',
                         help='attack the suite only, with inhibited_legs: [auto]')
-    options = parser.parse_args(arguments)
+    return run_command(parser, arguments, _attack)
+
+
+def _attack(options: argparse.Namespace, _: RosArguments) -> int:
     jobs = [(1000 * options.seed + k, options.seconds, options.weaken, options.failures,
              options.auto)
             for k in range(options.workers)]
@@ -162,7 +167,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         plain = json.loads(json.dumps(failures, default=float))  # no tuples, no types of NumPy
         print(yaml.safe_dump(plain, sort_keys=False, allow_unicode=True))
     if options.record is not None:
-        text = options.record.read_text(encoding='utf-8').rstrip('\n')
+        text = readable(options.record).read_text(encoding='utf-8').rstrip('\n')
         options.record.write_text(f'{text}\n{row}\n', encoding='utf-8')
     return 1 if failures else 0
 

@@ -28,6 +28,7 @@ from dmp_cpg_ros.analysis.bag import find_bag, opened, recorded
 from dmp_cpg_ros.analysis.manifest import host_facts
 from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.commands.ros_arguments import run_command
+from dmp_cpg_ros.configuration import readable
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.studies import bench_runs, long_recordings, relays
 from dmp_cpg_ros.studies.bench import parts_of_a_tick, seconds_of, ticks_per_second
@@ -378,7 +379,7 @@ def table(rows: Sequence[tuple[str, Figure]]) -> str:
 
 def update(document: Path, text: str) -> None:
     """Write a text between the marks of a document; raises DataError where there are none."""
-    before, begin, rest = document.read_text(encoding='utf-8').partition(BEGIN)
+    before, begin, rest = readable(document).read_text(encoding='utf-8').partition(BEGIN)
     _, end, after = rest.partition(END)
     if not end:
         raise DataError(f"'{document}' has no lines {BEGIN} and {END}")

@@ -25,6 +25,7 @@ from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.figures.gait import canonical_states, target_kinematics
 from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.configuration import writable
 from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
@@ -297,7 +298,7 @@ def _draw(options: argparse.Namespace, _: RosArguments) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
     with style.applied():
         for name, figure in figures(suite):
-            FigureCanvasAgg(figure).print_png(options.out / f'{name}.png')
+            FigureCanvasAgg(figure).print_png(writable(options.out / f'{name}.png'))
             print(options.out / f'{name}.png')
     return 0
 

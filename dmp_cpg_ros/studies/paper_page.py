@@ -24,7 +24,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.configuration import find_config, load_yaml
+from dmp_cpg_ros.configuration import find_config, load_yaml, readable, writable
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.model_reader import load_description
@@ -68,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _build(options: argparse.Namespace, _: RosArguments) -> int:
     options.out.mkdir(parents=True, exist_ok=True)
-    file = options.out / 'index.html'
+    file = writable(options.out / 'index.html')
     file.write_text(page(parts(download(options.out))), encoding='utf-8')
     print(f'{file}: {file.stat().st_size / 1e6:.1f} MB, open it in any browser')
     return 0
@@ -112,7 +112,7 @@ def parts(archives: Mapping[str, Path]) -> dict[str, bytes]:
         If an archive is not the one whose sum is named there.
     """
     for part, archive in archives.items():
-        found = base64.b64encode(hashlib.sha512(archive.read_bytes()).digest()).decode()
+        found = base64.b64encode(hashlib.sha512(readable(archive).read_bytes()).digest()).decode()
         if found != PACKAGES[part][2]:
             raise DataError(f"'{archive}' is not the archive that is meant: delete it")
     files_ = _unpacked(archives['pyodide'].read_bytes())

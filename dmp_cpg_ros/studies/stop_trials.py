@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.configuration import readable, writable
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import DataError
@@ -149,7 +150,7 @@ def run_cases(cases: Sequence[StopCase], file: str | None, workers: Workers,
         outcomes = _recorded(record, cases)
     walks = [list(group) for _, group in groupby(
         cases[len(outcomes):], lambda case: (*case.row, *case.walk))]
-    with workers, open(record or os.devnull, 'a', encoding='utf-8') as kept:
+    with workers, writable(record or os.devnull).open('a', encoding='utf-8') as kept:
         for of_walk in workers.map(partial(run_walk, file=file), walks):
             now = zip(cases[len(outcomes):], of_walk, strict=False)
             print(*(json.dumps({'case': vars(case), 'outcome': vars(outcome)})
@@ -160,7 +161,7 @@ def run_cases(cases: Sequence[StopCase], file: str | None, workers: Workers,
 
 def _recorded(record: Path, cases: Sequence[StopCase]) -> list[StopOutcome]:
     """Outcomes of the first cases; a last line that was not written to its end is dropped."""
-    data = record.read_bytes()
+    data = readable(record).read_bytes()
     whole = data[:data.rfind(b'\n') + 1]
     outcomes = []
     for number, (line, case) in enumerate(zip(whole.splitlines(), cases, strict=False), 1):

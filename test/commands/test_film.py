@@ -107,9 +107,13 @@ def test_a_missing_run_is_named(tmp_path, capsys):
     assert 'no_run' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('fps', ['0', 'nan', '-1'])
-def test_frames_per_second_are_positive(tmp_path, capsys, fps):
+@pytest.mark.parametrize(('option', 'value', 'valid'), [
+    ('--fps', '0', 'from 0.1 to 240'), ('--fps', '-1', 'from 0.1 to 240'),
+    ('--fps', '1e9', 'from 0.1 to 240'), ('--fps', 'nan', 'finite'),
+    ('--start', 'nan', 'finite'), ('--end', 'inf', 'finite'), ('--width', '0', 'from 32 to 3840'),
+    ('--width', '100000', 'from 32 to 3840'), ('--width', '100.5', 'a whole number')])
+def test_numbers_that_no_film_can_have_are_refused(tmp_path, capsys, option, value, valid):
     with pytest.raises(SystemExit) as ended:
-        main([str(tmp_path), str(tmp_path / 'film.gif'), '--fps', fps])
+        main([str(tmp_path), str(tmp_path / 'film.gif'), option, value])
     assert ended.value.code == 2
-    assert f'argument --fps: {fps} must be' in capsys.readouterr().err
+    assert f'argument {option}: {value} must be {valid}' in capsys.readouterr().err

@@ -214,6 +214,9 @@ def test_options_reach_the_primitive(tmp_path):
         ('a.csv', 'time,hip\n0,1\n1,x\n', 'no number'),
         ('a.csv', 'time,hip\n0,1,2\n', 'numbers in every row'),
         ('a.csv', 'time,hip\n0,1\n1,2\n', 'at least 8'),
+        ('a.csv', 'time,hip,hip\n' + '0,1,2\n' * 9, "names two columns 'hip'"),
+        ('a.csv', 'time,hip,time\n' + '0,1,2\n' * 9, "names two columns 'time'"),
+        ('a.csv', 'time,hip, \n' + '0,1,2\n' * 9, 'no name for column 3'),
         ('a.npy', 'no array', 'NumPy'),
         ('a.npz', 'no array', 'NumPy'),
         ('a.csv', 'time,hip\n' + '0,1\n' * 9, 'must increase'),
@@ -233,7 +236,10 @@ def test_files_that_cannot_be_used_are_named(name, content, text, tmp_path, caps
 def test_arrays_that_cannot_be_used_are_named(tmp_path, capsys):
     np.save(tmp_path / 'flat.npy', np.zeros(9))
     np.savez(tmp_path / 'bare.npz', positions=np.zeros((9, 1)))
-    for name, text in (('flat.npy', 'first column'), ('bare.npz', "no array 'times'")):
+    np.savez(tmp_path / 'twice.npz', times=np.arange(9.0), positions=np.zeros((9, 2)),
+             names=np.array(['hip', 'hip']))
+    for name, text in (('flat.npy', 'first column'), ('bare.npz', "no array 'times'"),
+                       ('twice.npz', "names two columns 'hip'")):
         assert main([str(tmp_path / name), '--out', str(tmp_path / 'out.yaml')]) == BAD_INPUT
         assert text in capsys.readouterr().err
 

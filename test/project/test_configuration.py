@@ -22,7 +22,9 @@ from dmp_cpg_ros.configuration import (
     find_config,
     load_yaml,
     node_parameters,
+    readable,
     unused_sections,
+    writable,
 )
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 
@@ -91,6 +93,23 @@ def test_what_is_no_file_is_called_what_it_is(
                        ('robots', 'a folder'), ('queue', 'a pipe'), ('/dev/null', 'a device')):
         with pytest.raises(MissingFileError, match=f"{name}' is {kind}, not a file$"):
             find_config(name)
+
+
+def test_what_has_no_end_is_not_read_and_what_waits_is_not_written(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / 'queue')
+    (tmp_path / 'link').symlink_to('queue')
+    (tmp_path / 'zeros').symlink_to('/dev/zero')
+    for name in ('queue', 'link', 'zeros', ''):
+        with pytest.raises(MissingFileError, match='is a (pipe|device|folder), not a file$'):
+            readable(tmp_path / name)
+        with pytest.raises(MissingFileError, match='is a (pipe|device|folder), not a file$'):
+            load_yaml(tmp_path / name)
+    for name in ('queue', 'link', ''):
+        with pytest.raises(MissingFileError, match='is a (pipe|folder), not a file to write$'):
+            writable(tmp_path / name)
+    for path in (tmp_path / 'new', Path('/dev/null'), Path(__file__)):
+        assert writable(path) == path
+    assert readable(tmp_path / 'new') == tmp_path / 'new'
 
 
 @pytest.mark.parametrize(('package', 'config', 'prefix_path'), [

@@ -23,7 +23,8 @@ MIDDLE = 0.5 * (LEG.position_lower + LEG.position_upper)
 def stride(k: int) -> JointTargets:
     """Targets of a leg that strides at the k-th tick."""
     phase = 2.0 * np.pi * 1e-9 * TICK_NS * k / PERIOD_S + np.arange(3)
-    return JointTargets(MIDDLE + 0.4 * np.sin(phase), 0.8 * np.pi / PERIOD_S * np.cos(phase), np.zeros(3))
+    return JointTargets(MIDDLE + 0.4 * np.sin(phase), 0.8 * np.pi / PERIOD_S * np.cos(phase),
+                        np.zeros(3))
 
 
 def believed(sent: Callable[[int], JointTargets | None], ticks: int) -> list[bool | None]:

@@ -5,6 +5,7 @@ needs nothing of the package. doc/certificate.md has the format and the reasons.
 """
 
 import json
+import os
 import sys
 from fractions import Fraction as F  # noqa: N817 - the file is read more than any other
 from typing import Any
@@ -20,10 +21,8 @@ def need(holds: bool, what: str) -> None:
 
 def read(value: Any) -> Any:
     """Fractions of strings, which must be in lowest terms."""
-    if isinstance(value, list):
-        return [read(one) for one in value]
-    if isinstance(value, dict):
-        return {key: read(one) for key, one in value.items()}
+    if isinstance(value, (list, dict)):
+        return [*map(read, value)] if type(value) is list else {x: read(value[x]) for x in value}
     need(isinstance(value, str) and len(value) < DIGITS and not value.strip('-/0123456789')
          and str(F(value)) == value, f'{value!r:.80} is no fraction')
     return F(value)
@@ -212,8 +211,9 @@ def once(pairs: Any) -> dict[str, Any]:
 
 if __name__ == '__main__':
     try:
+        need(os.path.isfile(sys.argv[1]), 'there is no such file, or it is a pipe or a device')
         with open(sys.argv[1], encoding='utf-8') as file:
             print('accepted:', *check(json.loads(file.read(2**20), object_pairs_hook=once)))
     except Exception as error:  # noqa: BLE001 - whatever goes wrong, it is no proof
         print(f'{" ".join(sys.argv[1:]) or "no file"} is refused: {error!r:.200}', file=sys.stderr)
-        sys.exit(2 if isinstance(error, OSError) or not sys.argv[1:] else 1)
+        sys.exit(2 if isinstance(error, OSError) or not os.path.isfile([*sys.argv, ''][1]) else 1)
