@@ -106,6 +106,7 @@ class SuiteWatch:
         self._progress: tuple[int, bool] | None = None
         self._stalled, self._stalled_s = health.Intervals(FIRST_WORD_S), 0.0
         self._asked: health.ReadinessOfOthers | None = None
+        self._hung_ns = -1  # robot time at which somebody hung last
         self._transitions = {name: player.create_client(ChangeState, f'{name}/change_state')
                              for name in (*WALKING_NODES, RECORDER)}
         self._recording, self._begun, self._ending = True, False, False
@@ -187,10 +188,12 @@ class SuiteWatch:
 
     def _end_hung(self, nodes: set[str], why: str) -> None:
         hung = [name for name, own in self._shared.items() if nodes.intersection(own)]
-        if not self._respawn:
+        at_ns = self._player.progress_ns
+        if not self._respawn or at_ns == self._hung_ns:  # nor does it help a second time
             raise SuiteError(f'{", ".join(hung)} hung: {why}')
+        self._hung_ns = at_ns
         for name in hung:
-            self._say(self._player.progress_ns * 1e-9, f'{name} hung ({why}) and is ended')
+            self._say(at_ns * 1e-9, f'{name} hung ({why}) and is ended')
             self._group.kill(name)
         self._progress = None
 

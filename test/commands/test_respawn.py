@@ -154,3 +154,37 @@ def test_a_node_that_hangs_is_named_and_the_run_has_failed(
     assert process.wait(RUN_S) == 1, str(process)
     # and whoever has not ended either, on a loaded machine
     assert re.search(r'walk: bag_recorder(, \w+)* hung', process.output), process
+
+
+FAILING = """
+from dmp_cpg_ros.nodes.posture_control import PostureControl
+
+on_tick = PostureControl.on_tick
+
+
+def failing(self, stamp_ns, values):
+    if stamp_ns > 1_000_000_000:
+        raise OverflowError('of the test')
+    on_tick(self, stamp_ns, values)
+
+
+PostureControl.on_tick = failing
+"""
+"""What lets a node fail at every tick after the first second, in each Python that starts."""
+
+
+@pytest.mark.parametrize('options', [('--composed',), ('--processes', 'blocks', '--respawn')])
+def test_in_lock_step_a_node_that_fails_in_its_tick_is_named_and_ends_the_run(
+        processes: Processes, tmp_path: Path, options: Sequence[str]) -> None:
+    (tmp_path / 'site').mkdir()
+    (tmp_path / 'site' / 'sitecustomize.py').write_text(FAILING, encoding='utf-8')
+    paths = os.pathsep.join((str(tmp_path / 'site'), processes.environment['PYTHONPATH']))
+    process = processes.python(
+        '-m', 'dmp_cpg_ros', 'walk', str(scenario(tmp_path, 4.0)), '--no-report', '--out',
+        str(tmp_path / 'run'), *LOCK_STEP, *options, PYTHONPATH=paths)
+    assert process.wait(RUN_S) == 1, str(process)
+    failed = r'posture_control: it failed in its tick at 1\.0\d\d s: OverflowError: of the test'
+    assert re.search(rf'the robot waits for .*{failed}', process.output), process
+    assert re.search(r'inhibition: it waits in its tick at 1\.0\d\d s of posture_feedback',
+                     process.output), process
+    assert re.search(rf'walk: \w+ hung: {failed}', process.output), process

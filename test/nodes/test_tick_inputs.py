@@ -48,6 +48,21 @@ def interleaving(seed: int, names: tuple[str, ...] = INPUTS, ticks: int = 12,
     return arrivals
 
 
+def test_it_tells_what_the_oldest_tick_lacks() -> None:
+    inputs, _ = recorder(lock_step=True, delayed=('d',))
+    assert inputs.awaited() == (-1, [])
+    for name in INPUTS:
+        inputs.add(name, TICK, 0)
+    inputs.add('b', 3 * TICK, 0)
+    inputs.add('b', 2 * TICK, 0)
+    assert inputs.awaited() == (2 * TICK, ['a', 'c', 'd'])
+    inputs.add('d', TICK, 0)
+    inputs.add('a', 2 * TICK, 0)
+    assert inputs.awaited() == (2 * TICK, ['c'])
+    inputs.add('c', 2 * TICK, 0)
+    assert inputs.awaited() == (3 * TICK, ['a', 'c', 'd'])
+
+
 @given(SEEDS)
 def test_in_lock_step_every_tick_has_exactly_its_messages(seed: int) -> None:
     inputs, fired = recorder(lock_step=True)
