@@ -19,7 +19,7 @@ from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, RobotState
 from dmp_cpg_ros.layouts import work_rows
 from dmp_cpg_ros.nodes.messages import cdr
 from dmp_cpg_ros.nodes.messages.joint_states import AnyJoints, JointStateReader, JointStateWriter
-from dmp_cpg_ros.nodes.messages.values import Array, checked, sensed, set_stamp
+from dmp_cpg_ros.nodes.messages.values import LARGEST, Array, checked, sensed, set_stamp
 
 BASE_FRAME, ODOM_FRAME, WORLD_FRAME = 'base_link', 'odom', 'world'
 """Frames: the base, where it believes that it was switched on (REP-105), and the simulator's."""
@@ -117,9 +117,10 @@ class OdometryWriter:
     def fill(self, time_ns: int, position: Array, quaternion: Array, velocity: Array,
              rate: Array, velocity_variance: Array | float = 0.0) -> cdr.SerializedOdometry:
         """Refill with position [m], quaternion x, y, z, w, velocity [m/s] and turn rate [rad/s] in
-        the base's frame, and with the variances of the velocity [m²/s²].
+        the base's frame, and with the variances of the velocity [m²/s²], or what a message holds
+        at most: nothing may be known for long.
         """
-        self._covariance[:15:7] = velocity_variance
+        self._covariance[:15:7] = np.minimum(velocity_variance, LARGEST)
         return cdr.SerializedOdometry(self._message.filled(
             time_ns, position, quaternion, velocity, rate, self._covariance))
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from dmp_cpg_ros.nodes.messages.robot_state import (
     read_imu,
     read_odom,
 )
+from dmp_cpg_ros.nodes.messages.values import LARGEST
 from dmp_cpg_ros.nodes.posture_control import sensor_readings
 
 processes, ros_domain, ros = ros_processes.processes, ros_processes.ros_domain, ros_processes.ros
@@ -93,6 +95,26 @@ def test_the_estimate_passes_bit_for_bit() -> None:
     covariance = np.reshape(message.twist.covariance, (6, 6))
     assert np.array_equal(covariance.diagonal()[:3], estimate.velocity_variance)
     assert covariance.sum() == pytest.approx(estimate.velocity_variance.sum())
+
+
+def test_a_robot_that_has_felt_nothing_for_minutes_tells_that_it_knows_nothing() -> None:
+    """Without IMU and feet the variance of the velocity grows with the third power of time."""
+    robot = quadruped()
+    estimator, writer = BodyEstimator(robot, EstimationParameters()), OdometryWriter()
+    memory, _ = estimator.step(None, readings_of(standing_state(robot)))
+    for k in range(1, 2000):
+        told = readings_of(standing_state(robot, k * 100_000_000))
+        nothing = np.full(3, np.nan)
+        memory, estimate = estimator.step(memory, replace(
+            told, rate_in_base=nothing, specific_force_in_base=nothing, foot_force=np.zeros(4)))
+        variances = np.array(wire(writer.fill_estimate(estimate)).twist.covariance)[:15:7]
+        assert np.array_equal(variances, np.minimum(estimate.velocity_variance, LARGEST))
+    assert estimate.velocity_variance.max() > LARGEST
+    for k in range(1, 250):
+        told = readings_of(standing_state(robot, 200_000_000_000 + k * 4_000_000))
+        memory, estimate = estimator.step(memory, told)
+    assert estimate.velocity_variance.max() < 1e-2
+    assert not estimate.problems
 
 
 def test_the_node_bears_silent_sensors_and_names_them(processes: Processes, ros: Ros) -> None:
