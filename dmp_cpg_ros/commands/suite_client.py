@@ -30,6 +30,7 @@ from dmp_cpg_ros.nodes.framework.execution import (
     start_ros,
     without_ros_arguments,
 )
+from dmp_cpg_ros.nodes.framework.strangers import Strangers
 from dmp_cpg_ros.nodes.messages.commands import twist
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, Interface, interface
 
@@ -68,7 +69,7 @@ class SuiteClient:
 
     def __init__(self, node: Node, wait_s: float) -> None:
         """Add the node to an executor."""
-        self.node, self._wait_s = node, wait_s
+        self.node, self._wait_s, self._strangers = node, wait_s, Strangers(node)
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
 
@@ -116,6 +117,9 @@ class SuiteClient:
         """Result of the first future that is done; raises ClientError when none is in time."""
         if not self.spin_until(lambda: any(future.done() for future in futures), within_s):
             raise ClientError(f'{name} did not answer within {ANSWER_WITHIN_S:g} s')
+        if who := self._strangers.serving(name):
+            print(f'warning: {name} is not only of the suite{who}: whoever is faster answers',
+                  file=sys.stderr)
         return next(future for future in futures if future.done()).result()
 
     def publisher(self, topic: Interface) -> Publisher:

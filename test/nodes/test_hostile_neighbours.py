@@ -34,7 +34,13 @@ from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterEvent, ParameterValue
-from rcl_interfaces.srv import GetParameters, SetParameters
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    GetParameterTypes,
+    ListParameters,
+    SetParameters,
+)
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
@@ -215,6 +221,14 @@ def follower(ros: Ros) -> Any:
     node.destroy_node()
 
 
+def bare_node(ros: Ros, name: str) -> Node:
+    """Return a node of a name, without the services that a node usually has."""
+    node = Node(name, context=ros.context, start_parameter_services=False)
+    ros.nodes.append(node)
+    ros.executor.add_node(node)
+    return node
+
+
 def test_news_that_the_owner_has_not_told_change_nothing(ros: Ros, follower: Any) -> None:
     """The follower asks the owner, which has another gait than the news say."""
     gait = 'amble'
@@ -225,7 +239,8 @@ def test_news_that_the_owner_has_not_told_change_nothing(ros: Ros, follower: Any
             else follower.get_parameter(name).get_parameter_value() for name in request.names]
         return response
 
-    ros.node.create_service(GetParameters, 'canonical_oscillators/get_parameters', answer)
+    owner = bare_node(ros, 'canonical_oscillators')
+    owner.create_service(GetParameters, 'canonical_oscillators/get_parameters', answer)
     publisher = ros.node.create_publisher(
         ParameterEvent, '/parameter_events', qos_profile_parameter_events)
     ros.spin_until(lambda: publisher.get_subscription_count() > 0)
@@ -265,6 +280,63 @@ def test_parameter_requests_without_end_are_not_all_looked_at(ros: Ros, follower
     answer = ros.call(SetParameters, name, many)
     assert 'too many' in answer.results[0].reason and len(answer.results) < 1000
     assert follower.health.rejected['set_parameters'] > len(reasons)
+
+
+def test_no_more_parameters_are_told_than_ticks_can_bear(ros: Ros, follower: Any) -> None:
+    name, known = 'follower/get_parameters', list(follower._parameters)
+    every = ros.call(GetParameters, name, GetParameters.Request(names=known))
+    assert len(every.values) == len(known)
+    assert not ros.call(GetParameters, name, GetParameters.Request(
+        names=['max_speed'] * 100_000)).values
+    assert follower.health.rejected['get_parameters'] >= 1
+    said = follower.health.status('', {}, periodic=True).status[0].message
+    assert 'at most 200 at once' in said and f'asked by /{ros.node.get_name()}' in said
+    for kind, service, what in ((DescribeParameters, 'describe_parameters', 'names'),
+                                (GetParameterTypes, 'get_parameter_types', 'names'),
+                                (ListParameters, 'list_parameters', 'prefixes')):
+        before = follower.health.rejected['get_parameters']
+        ros.call(kind, f'follower/{service}', kind.Request(**{what: ['a'] * 1000}))
+        assert follower.health.rejected['get_parameters'] > before
+    before, asked = follower.health.rejected['get_parameters'], 0
+    while follower.health.rejected['get_parameters'] == before:
+        ros.call(GetParameters, name, GetParameters.Request(names=['max_speed'] * 200))
+        asked += 200
+        assert asked < 1_000_000
+    assert asked >= 2000
+
+
+def test_a_second_server_of_a_service_is_named_and_its_answers_are_not_believed(
+        ros: Ros, follower: Any) -> None:
+    owner, stranger = bare_node(ros, 'canonical_oscillators'), bare_node(ros, 'stranger')
+    told: list[str] = []
+
+    def answering(gait: str) -> Any:
+        def answer(request: Any, response: Any) -> Any:
+            told.append(gait)
+            response.values = [
+                ParameterValue(type=4, string_value=gait) if name == 'gait' else
+                follower.get_parameter(name).get_parameter_value() for name in request.names]
+            return response
+
+        return answer
+
+    service = 'canonical_oscillators/get_parameters'
+    forged = stranger.create_service(GetParameters, service, answering('trot'))
+    stranger.create_service(Trigger, 'follower/ready', lambda _, response: response)
+    ros.spin_until(lambda: service in follower.health.rejected)
+    assert told and follower.get_parameter('gait').value == 'amble'
+    assert 'served by /stranger' in follower.health.status('', {}, periodic=True).status[0].message
+
+    def named() -> bool:
+        follower.health.stamp_ns += 1_000_000_000
+        follower.end_tick()
+        return any('ready is not only of this node; served by /stranger' in text
+                   for _, text in follower.health._problems.values())
+
+    ros.spin_until(named)
+    stranger.destroy_service(forged)
+    owner.create_service(GetParameters, service, answering('pace'))
+    ros.spin_until(lambda: follower.get_parameter('gait').value == 'pace')
 
 
 def test_who_may_have_sent_what_names_no_sender_is_told(ros: Ros, follower: Any) -> None:

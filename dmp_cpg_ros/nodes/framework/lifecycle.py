@@ -10,14 +10,11 @@ rclpy's own ones included, therefore calls through :meth:`GuardedLifecycleNode.g
 from __future__ import annotations
 
 import contextlib
-import time
 import traceback
 from collections.abc import Callable
 from functools import partial
 from typing import Any, ClassVar
 
-from rcl_interfaces.msg import SetParametersResult
-from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.clock import Clock, ClockType
 from rclpy.exceptions import InvalidHandle
 from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -29,15 +26,8 @@ from rclpy.timer import Timer
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.nodes.framework.health import NodeHealth
 from dmp_cpg_ros.nodes.framework.judging import sends_later
+from dmp_cpg_ros.nodes.framework.request_limits import RequestLimits
 from dmp_cpg_ros.nodes.framework.strangers import Strangers
-
-CHANGES, CHANGES_HZ = 20.0, 2.0
-"""Requests to change parameters that are heard at once, and in the long run [1/s]: to judge one
-takes longer than a tick. They are counted, not timed, so that a slow machine refuses no other.
-"""
-
-MOST_CHANGES = 200
-"""Parameters that one request may change."""
 
 
 class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
@@ -74,7 +64,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
     def __init__(self, name: str, **options: Any) -> None:
         """Create the node, unconfigured."""
         self._traced: set[tuple[str, type[Exception]]] = set()
-        self._changes = CHANGES, time.monotonic()
+        self._request_limits = RequestLimits(self)
         self.strangers = Strangers(self)
         self.active = self.configured = False
         self.state_label = 'unconfigured'
@@ -254,9 +244,8 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Callable[..., Any],
                        *arguments: Any, **options: Any) -> Service:
-        """Create a service with a guarded callback; one of parameters is not asked too often."""
-        if srv_type in (SetParameters, SetParametersAtomically):
-            callback = self._limited(srv_name, callback)
+        """Create a service with a guarded callback; one of parameters is not asked too much."""
+        callback = self._request_limits.limited(srv_type, srv_name, callback)
         who = partial(self.strangers.asking, srv_name)
         service = super().create_service(
             srv_type, srv_name, self.guarded(srv_name, callback, who), *arguments, **options)
@@ -273,29 +262,6 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
     def change(self, make: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
         """Answer a request to change parameters, at once or later; rclpy makes the change."""
         return make(request, response)
-
-    def _limited(self, service: str, callback: Callable[..., Any]) -> Callable[..., Any]:
-        """Refuse changes of parameters that come so often that ticks would starve."""
-        def answer(request: Any, response: Any) -> Any:
-            left, then = self._changes
-            now = time.monotonic()
-            left = min(CHANGES, left + CHANGES_HZ * (now - then))
-            heard = (self.lock_step or left >= 1.0) and len(request.parameters) <= MOST_CHANGES
-            self._changes = max(0.0, left - heard), now
-            if heard:
-                return self.change(callback, request, response)
-            refusal = SetParametersResult(successful=False, reason=(
-                'too many changes of parameters; ask again in a few seconds'))
-            if self.health.reject('set_parameters',
-                                  refusal.reason + self.strangers.asking(service)):
-                self.report()
-            if hasattr(response, 'results'):
-                response.results = [refusal] * min(len(request.parameters), MOST_CHANGES)
-            else:
-                response.result = refusal
-            return response
-
-        return answer
 
     def create_timer(self, timer_period_sec: float, callback: Callable[..., Any],
                      *arguments: Any, **options: Any) -> Timer:

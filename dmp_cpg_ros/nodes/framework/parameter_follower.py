@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 
 
+ANYBODYS = 'not believed: a stranger answers in the name of this service too'
+"""Why an answer is dropped."""
 
 ASK_EVERY_S = 5.0
 """Period of asking the owners [s]: what an event did not tell, because a node was not there yet or
@@ -104,6 +106,10 @@ class ParameterFollower:
     def _answered(self, owner: str, claimed: Mapping[str, Any], future: Future) -> None:
         answer, names = future.result(), self._names[owner]
         if answer is None or len(answer.values) != len(names):
+            return
+        asked = f'{owner}/get_parameters'
+        if who := self._node.strangers.serving(asked):
+            self._node.drop(asked, DataError(ANYBODYS), who)
             return
         told = self._plain(owner, dict(zip(names, answer.values, strict=True)))
         if owner in self._claimed:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from functools import partial
 from math import inf
 
 from rclpy.exceptions import NotInitializedException
@@ -42,15 +43,24 @@ class Strangers:
 
     def asking(self, service: str) -> str:
         """Text that names who has a client of a service; empty for nobody."""
-        def names() -> Iterable[str]:
-            full = self._node.resolve_service_name(service)
-            for name, space in self._node.get_node_names_and_namespaces():
-                with suppress(NodeNameNonExistentError):  # it has just gone
-                    clients = self._node.get_client_names_and_types_by_node(name, space)
-                    if any(full == client for client, _ in clients):
-                        yield self._stranger(name, space)
+        return self._told(f'clients of {service}', 'asked by', partial(
+            self._ends, service, self._node.get_client_names_and_types_by_node))
 
-        return self._told(f'service {service}', 'asked by', names)
+    def serving(self, service: str) -> str:
+        """Text that names who serves a service of the suite and is none of its nodes: of two
+        servers whoever is faster answers. Empty for nobody.
+        """
+        return self._told(f'servers of {service}', 'served by', partial(
+            self._ends, service, self._node.get_service_names_and_types_by_node))
+
+    def _ends(self, service: str, of_node: Callable[[str, str], list[tuple[str, list[str]]]]
+              ) -> Iterable[str]:
+        """Nodes that have an end of a service."""
+        full = self._node.resolve_service_name(service)
+        for name, space in self._node.get_node_names_and_namespaces():
+            with suppress(NodeNameNonExistentError):  # it has just gone
+                if any(full == end for end, _ in of_node(name, space)):
+                    yield self._stranger(name, space)
 
     def publishing(self, topic: str) -> str:
         """Text that names who publishes a topic; empty for nobody."""

@@ -241,7 +241,18 @@ class SuiteNode(ConnectedNode):
         """
         if self.health.due():
             self._commands.watch_types()
+            self._watch_services()
             self.report(periodic=True)
+
+    def _watch_services(self) -> None:
+        """Tell which of the node's services somebody else serves too."""
+        for service in self.services:
+            name, key = service.service_name, f'servers of {service.service_name}'
+            who = self.strangers.serving(name) if self.count_services(name) > 1 else ''
+            if who:
+                self.warn(key, f'{name} is not only of this node{who}: whoever is faster answers')
+            else:
+                self.clear(key)
 
     def _run_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         self.elapsed = self._clock_of_ticks.step(stamp_ns)
