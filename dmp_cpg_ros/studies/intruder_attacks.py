@@ -18,13 +18,14 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterEvent, ParameterValue
-from rcl_interfaces.srv import SetParameters
+from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameter_events
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from std_srvs.srv import SetBool
 
 from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -213,6 +214,31 @@ def _parameters(owner: str, name: str) -> Callable[[Intruder], None]:
     return attack
 
 
+def _questions(node: Intruder) -> None:
+    for name in WALKING_NODES:
+        node.call(GetParameters, f'{name}/get_parameters',
+                  [GetParameters.Request(names=['gait'] * 100_000)], 50.0)
+
+
+def _second_servers(node: Intruder) -> None:
+    """Answer in the name of the suite: another gait, and that what was not done is."""
+    def gait(request: Any, response: Any) -> Any:
+        response.values = [ParameterValue(type=4, string_value='trot')] * len(request.names)
+        return response
+
+    def done(_: Any, response: Any) -> Any:
+        response.success = True
+        return response
+
+    services = [node.create_service(GetParameters, f'{owner}/get_parameters', gait)
+                for owner in core.CHANGEABLE] + [
+        node.create_service(SetBool, 'inhibit', done)]
+    node.sent += len(services)
+    node.spin(3.0 * ATTACK_S)  # followers ask every 5 s
+    for service in services:
+        node.destroy_service(service)
+
+
 def _second_robot(node: Intruder) -> None:
     robot = subprocess.Popen([sys.executable, '-m', 'dmp_cpg_ros', ROBOT, '--ros-args', '-r',
                               f'__node:={NAME}'], stderr=subprocess.DEVNULL)
@@ -252,6 +278,8 @@ ATTACKS: dict[str, Callable[[Intruder], None]] = {
     'transitions': _transitions,
     '1,000 rho a second': _parameters(core.CANONICAL, 'rho'),
     '1,000 friction a second': _parameters(POSTURE, 'friction'),
+    'questions of 100,000 names': _questions,
+    'second servers': _second_servers,
     'second robot': _second_robot,
 }
 """What the intruder does, by name."""
