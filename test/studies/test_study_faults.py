@@ -7,10 +7,13 @@ from __future__ import annotations
 import random
 from math import inf
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from dmp_cpg_ros.studies import study_faults
+from dmp_cpg_ros.suite import load_gaits
 
 
 class Stuck:
@@ -35,3 +38,45 @@ def test_a_walk_that_never_walks_is_ended(
     outcome = study_faults.run(
         'amble', 0.5, False, False, ['inhibition'], random.Random(0), tmp_path)
     assert (outcome.status, outcome.kills) == (137, [])
+
+
+def recording(gait: str, off_s: tuple[float, float], slow_s: tuple[float, float],
+              fell: bool) -> SimpleNamespace:
+    """Ten seconds of a walk with a period of 0.5 s: a leg is out of phase and the body slow from
+    a moment to another one, and in the end it lies on its side.
+    """
+    time = np.arange(0.0, 10.0, 0.004)
+    phases = 4.0 * np.pi * time[:, None] + load_gaits()[gait].phases
+    phases[:, 2] += 1.0 * ((time >= off_s[0]) & (time < off_s[1]))
+    speed = np.where((time >= slow_s[0]) & (time < slow_s[1]), 0.1, 0.5)
+    side = 0.5 * np.pi * fell * (time > 9.5)
+    zero = np.zeros_like(time)
+    return SimpleNamespace(
+        canonical=SimpleNamespace(
+            time=time, x=0.8 * np.stack((np.cos(phases), -np.sin(phases)), axis=2)),
+        odometry=SimpleNamespace(
+            time=time, velocity_in_base=np.stack((speed, zero, zero), axis=1),
+            quaternion=np.stack((np.sin(0.5 * side), zero, zero, np.cos(0.5 * side)), axis=1),
+            position_in_world=np.stack((zero, zero, zero + 0.3), axis=1)))
+
+
+@pytest.mark.parametrize('fell', [False, True])
+def test_phase_and_speed_are_told_apart_and_a_fall_is_seen(
+        monkeypatch: pytest.MonkeyPatch, tmp_path: Path, fell: bool) -> None:
+    monkeypatch.setattr(study_faults, 'load_recording', lambda _: recording(
+        'amble', (2.0, 3.5), (2.0, 4.5), fell))
+    kills = [study_faults.Kill('inhibition', 2.0, back_s=3.0, follows_s=3.2),
+             study_faults.Kill('posture_control', 6.0, back_s=6.5, follows_s=7.0),
+             study_faults.Kill('reference_filter', 6.8, back_s=7.0)]
+    outcome = study_faults.Outcome('amble', False, True, 0, kills=kills)
+    study_faults._judge(outcome, 0.5, tmp_path)
+    assert (outcome.fell, outcome.end) == (fell, 'fallen' if fell else 'standing')
+    first, forestalled, last = kills
+    assert first.period_s == pytest.approx(0.5, rel=0.01)
+    assert first.in_phase_s == pytest.approx(3.5, abs=0.01)
+    assert first.as_fast_s == pytest.approx(4.5, abs=0.01)
+    assert first.cycles(first.in_phase_s) == pytest.approx(1.0, abs=0.05)
+    assert forestalled.in_phase_s == inf  # before the robot followed, the next one was killed
+    assert last.in_phase_s == pytest.approx(7.0, abs=0.01)
+    (row,) = study_faults.rows([outcome])
+    assert row[:7] == ['amble', 'real', 'yes', '1', '3', str(int(fell)), '2 of 3']
