@@ -39,9 +39,9 @@ def astray(of: Sequence[intruder.Outcome]) -> int:
 
 
 def kills(results: Any) -> str:
-    """Of ``study_faults``, of which what was in real time was run on a full machine."""
+    """Of ``study_faults``: how many deaths, and how many falls."""
     told = []
-    for lock_step, how in ((True, 'in lock-step'), (False, 'in real time on a full machine')):
+    for lock_step, how in ((True, 'in lock-step'), (False, 'in real time')):
         of = [one for one in results if one['lock_step'] == lock_step]
         fell, count = sum(one['fell'] for one in of), sum(len(one['kills']) for one in of)
         told.append(f'{count} nodes killed {how}: {fell or "no"} fall')
