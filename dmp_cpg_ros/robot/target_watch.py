@@ -60,8 +60,10 @@ class TargetWatch:
         """Begin without targets."""
         self._limits = list(zip(leg.position_lower.tolist(), leg.position_upper.tolist(),
                                 leg.velocity_limit.tolist(), strict=True))
-        self._gap_ns, self._stamp_ns, self._uneasy_ns = gap_ns, -1, -1
-        self._position = self._velocity = self._jumped = NOTHING
+        self._gap_ns, self._uneasy_ns = gap_ns, -1
+        self._stamp_ns: int | None = None
+        self._position: list[float] = []
+        self._velocity = self._jumped = NOTHING
         self._cut = [False] * len(JOINTS_OF_LEG)
         self.doubted_ns = -1
 
@@ -76,14 +78,15 @@ class TargetWatch:
             Arrays (3,), finite.
         """
         position, velocity = targets.position.tolist(), targets.velocity.tolist()
-        rests, gap_ns = max(map(abs, velocity)) <= RESTING, stamp_ns - self._stamp_ns
+        rests, last_ns = max(map(abs, velocity)) <= RESTING, self._stamp_ns
         if position == self._position and not rests:
             self.doubted_ns = stamp_ns
             return False
-        if self._stamp_ns < 0 or gap_ns > self._gap_ns:
+        if last_ns is None or stamp_ns - last_ns > self._gap_ns:
             self._jumped = NOTHING
         else:
-            self._jumped = self._jumps(stamp_ns, 1e-9 * gap_ns, position, velocity, rests)
+            self._jumped = self._jumps(
+                stamp_ns, 1e-9 * (stamp_ns - last_ns), position, velocity, rests)
         self._stamp_ns, self._position, self._velocity = stamp_ns, position, velocity
         if self._jumped is NOTHING:
             return True

@@ -77,7 +77,8 @@ def test_each_leg_is_carried_by_its_own_age(standing: PerfectTrackingRobot) -> N
 def test_what_comes_within_the_lead_acts_at_its_end_however_it_came(
         standing: PerfectTrackingRobot, lead: int, seed: int) -> None:
     random, state = np.random.default_rng(seed), standing.reset()
-    sent = [JointTargets(*values) for values in random.normal(size=(40, 3, 12))]
+    sent = [JointTargets(0.003 * position, *others)  # more would be a jump
+            for position, *others in random.normal(size=(40, 3, 12))]
     arrival = np.maximum.accumulate(np.arange(40) + random.integers(0, lead + 1, size=40))
     guard = make_guard(standing.description, lead * TICK_NS)
     accept(guard, 0, sent[0])
@@ -97,21 +98,24 @@ def test_what_comes_now_and_then_is_not_followed_until_it_is_in_time_for_a_while
     """What the robot does by itself while targets are late is the same with one in between, where
     there is a rhythm with which to go on.
     """
-    random, state = np.random.default_rng(seed), standing.reset()
-    stride, other = random.normal(size=12), JointTargets(*random.normal(size=(3, 12)))
+    state, stride = standing.reset(), np.random.default_rng(seed).normal(size=12)
     never, once, again = guards = [make_guard(standing.description) for _ in range(3)]
-    begin = 150
+    begin, turn = 150, 2.0 * np.pi / 60.0
+
+    def strides(tick: int, ahead: float = 0.0) -> JointTargets:
+        phase = turn * tick + ahead
+        return JointTargets(np.sin(phase) * stride,
+                            np.cos(phase) * stride * turn * 1e9 / TICK_NS, np.zeros(12))
+
     for tick in range(begin + 1):
-        phase = 2.0 * np.pi * tick / 60
         for guard in guards:
-            accept(guard, tick * TICK_NS, JointTargets(
-                np.sin(phase) * stride, np.cos(phase) * stride, np.zeros(12)))
+            accept(guard, tick * TICK_NS, strides(tick))
             guard.targets(replace(state, time_ns=tick * TICK_NS))
     late, settled = begin + LONGEST + 5, begin + LONGEST + 5 + IN_TIME_NS // TICK_NS
     for tick in range(begin + 1, begin + 40):
         stamp = tick * TICK_NS
         for guard in [once] * (tick == late) + [again] * (tick >= late):
-            accept(guard, stamp, other)
+            accept(guard, stamp, strides(tick, 1.0))
         each = [guard.targets(replace(state, time_ns=stamp)).position for guard in guards]
         assert np.array_equal(each[0], each[1])
         assert np.array_equal(each[0], each[2]) == (tick < settled)
@@ -121,10 +125,10 @@ def test_moving_legs_that_are_late_without_a_rhythm_are_held_and_then_left(
         standing: PerfectTrackingRobot) -> None:
     """Until then whatever comes is followed at once: the joints are still where it left off."""
     state, guard = standing.reset(), make_guard(standing.description)
-    moving = JointTargets(state.joint_position, np.ones(12), np.zeros(12))
     held = HELD_NS // TICK_NS
     for tick in range(3 * held):
         if tick % held == 0 and tick <= held:
+            moving = JointTargets(state.joint_position + 1e-3 * tick, np.ones(12), np.zeros(12))
             accept(guard, tick * TICK_NS, moving)
         given_out = guard.targets(replace(state, time_ns=tick * TICK_NS))
         age = min(tick, tick - held if tick >= held else tick)

@@ -10,6 +10,7 @@ the hooks that it needs: ``configure``, ``activate``, ``deactivate``, ``cleanup`
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import Any, ClassVar, TypeVar, cast
@@ -33,6 +34,9 @@ from dmp_cpg_ros.suite_table import KINDS
 LOOK_AFTER_S = 0.02
 """How often a node looks after inputs that do not wake it, in case the one that does is late [s].
 """
+
+STALLED_S = 1.0
+"""Time after the beginning of a tick from which on it is told what the next one lacks [s]."""
 
 P = TypeVar('P', bound=Parameters)
 Readers = Mapping[str, Callable[[Any], Any]]
@@ -77,7 +81,7 @@ class SuiteNode(ConnectedNode):
     certified: Certified | None = None
     inputs: TickInputs
     elapsed = 0.0
-    _failed = ''
+    _failed, _begun_s = '', 0.0
 
     def __init__(self, name: str | None = None, **options: Any) -> None:
         """Create the node and check its parameters; raises ParameterError for a bad one."""
@@ -225,7 +229,7 @@ class SuiteNode(ConnectedNode):
     def begin_tick(self, stamp_ns: int) -> None:
         """Start a tick: waiting commands are taken and changed parameters take effect."""
         self.health.ticks += 1
-        self.health.stamp_ns = stamp_ns
+        self.health.stamp_ns, self._begun_s = stamp_ns, time.monotonic()
         self._commands.take()
         self.take_parameters()
 
@@ -267,10 +271,12 @@ class SuiteNode(ConnectedNode):
         self._failed = ''
 
     def unfinished(self) -> str:
-        """In lock-step, where nobody goes on: what the tick lacks that has not ended, or how it
-        failed; else empty.
+        """How the last tick failed; in lock-step, where nobody goes on, what the one lacks that
+        has not ended for a while; else empty.
         """
-        stamp_ns, lacking = self.awaited() if self.lock_step and self.active else (-1, [])
+        waits = self.lock_step and self.active and (
+            time.monotonic() > self._begun_s + STALLED_S)
+        stamp_ns, lacking = self.awaited() if waits else (-1, [])
         return self._failed or (lacking and f'{LACKS} {stamp_ns * 1e-9:.3f} s of '
                                 f'{", ".join(lacking)}' or '')
 
