@@ -74,15 +74,18 @@ class SuiteClient:
         self._executor.add_node(node)
 
     def spin_until(self, condition: Callable[[], object], within_s: float = math.inf) -> bool:
-        """Run callbacks until a condition holds; returns whether it does."""
+        """Run callbacks until a condition holds; returns whether it does. An interrupt that was
+        lost, as in what Python calls while it tidies up, counts as well.
+        """
         deadline = time.monotonic() + within_s
+        _end_if_interrupted()
         while not condition() and time.monotonic() < deadline:
+            _end_if_interrupted()
             left_s = max(0.0, deadline - time.monotonic())
             try:
                 self._executor.spin_once(timeout_sec=min(STEP_S, left_s))
             except RuntimeError:  # what C++ makes of an interrupt that meets it in a callback
-                if _interrupts:
-                    raise KeyboardInterrupt from None
+                _end_if_interrupted()
                 raise
         return bool(condition())
 
@@ -184,6 +187,11 @@ _interrupts: list[int] = []
 def _interrupt(number: int, _: object) -> None:
     _interrupts.append(number)
     raise KeyboardInterrupt
+
+
+def _end_if_interrupted() -> None:
+    if _interrupts:
+        raise KeyboardInterrupt from None
 
 
 def connected(name: str, words: Sequence[str], wait_s: float) -> SuiteClient:
