@@ -33,7 +33,7 @@ CLIENTS = ('joystick', 'robot_client', 'teleop')
 """Commands that are nodes of these names, with the rights of a user of the suite."""
 
 VIEWER = 'live_view'
-"""A command that looks on: it may read what a recorder may, and ask for parameters."""
+"""A command that looks on and steers: a user that may read what a recorder may."""
 
 PARAMETER_SERVICES = tuple(f'~/{name}' for name in (
     'describe_parameters', 'get_parameter_types', 'get_parameters', 'list_parameters',
@@ -96,13 +96,10 @@ def rules_of_player() -> Rules:
 
 
 def rules_of_viewer() -> Rules:
-    """What whoever looks on may do."""
-    return {
-        ('publish', 'topic'): {'/rosout', '/parameter_events'},
-        ('subscribe', 'topic'): {topic.name for topic in interfaces.read_by(RECORDER)},
-        ('reply', 'service'): set(USUAL_SERVICES),
-        ('request', 'service'): {f'/{node}/{service}' for node in KIND_OF
-                                 for service in ('get_parameters', 'ready')}}
+    """What the live view does besides: it shows what a recorder may read."""
+    rules = rules_of_user()
+    rules['subscribe', 'topic'] |= {topic.name for topic in interfaces.read_by(RECORDER)}
+    return rules
 
 
 def policies() -> dict[str, Rules]:
