@@ -50,10 +50,10 @@ def test_the_policy_is_that_of_the_tables() -> None:
     assert POLICY.read_text(encoding='utf-8') == security_policy.policy_xml()
 
 
-RARE = {'canonical_state', 'foot_contacts', 'gait_memory', 'ground_truth', 'joint_states', '/tf',
-        '/tf_static'}
-"""Topics that some parameters, or a recorder, or a package beside the wheels ask for."""
-
+RARE = {'/clock', 'canonical_state', 'foot_contacts', 'gait_memory', 'ground_truth',
+        'joint_states', '/tf', '/tf_static'}
+"""Topics for some parameters, for real time or lock-step alone, or for what is not in the wheels.
+"""
 
 STEERING = {('publish', 'topic'): '/cmd_vel', ('subscribe', 'topic'): '/inhibition_gains',
             ('request', 'service'): '/inhibit',
@@ -63,12 +63,11 @@ STEERING = {('publish', 'topic'): '/cmd_vel', ('subscribe', 'topic'): '/inhibiti
 SCENARIO = 'name: w\nduration: 600.0\nparameters: {voting: true}\nevents: []\n'
 
 
+@pytest.mark.parametrize('options', [(), ('--lock-step',)])
 def test_the_policy_covers_the_running_graph(
-        processes: Processes, ros: Ros, tmp_path: Path) -> None:
-    """In real time and in lock-step: each end has its right, and but for rare ones each right of
-    a node its end.
-    """
-    node, used = ros.node, defaultdict[tuple[str, tuple[str, str]], set[str]](set)
+        processes: Processes, ros: Ros, tmp_path: Path, options: tuple[str, ...]) -> None:
+    """Each end has its right, and but for rare ones each right of a node its end."""
+    node = ros.node
     ends = {('publish', 'topic'): node.get_publisher_names_and_types_by_node,
             ('subscribe', 'topic'): node.get_subscriber_names_and_types_by_node,
             ('reply', 'service'): node.get_service_names_and_types_by_node,
@@ -77,34 +76,33 @@ def test_the_policy_covers_the_running_graph(
                        for of, rights in rules.items()}
                 for name, rules in security_policy.policies().items()}
     there = {*WALKING_NODES, RECORDER, security_policy.PLAYER, security_policy.VIEWER}
-    for options in ((), ('--lock-step',)):
-        walk = processes.walk(SCENARIO, tmp_path / f'run{len(options)}', '--rate', str(SHARED_HZ),
-                              *options)
-        walk.wait_for_output(r'at rest', RUN_S)
-        view = processes.executable(security_policy.VIEWER, '--port', '0')
+    used = defaultdict[tuple[str, tuple[str, str]], set[str]](set)
+    walk = processes.walk(SCENARIO, tmp_path / 'run', '--rate', str(SHARED_HZ), *options)
+    walk.wait_for_output(r'at rest', RUN_S)
+    view = processes.executable(security_policy.VIEWER, '--port', '0')
 
-        def wanted() -> list[str]:
-            lacking = []
-            for name in there:
-                for of, rights in policies[name].items():
-                    with suppress(NodeNameNonExistentError):
-                        used[name, of] |= {end for end, _ in ends[of](name, '/')}
-                    if of == ('reply', 'service') and name == security_policy.VIEWER:
-                        continue  # it has no parameters
-                    if name not in (security_policy.PLAYER, security_policy.VIEWER):
-                        rare = {full(topic, name) for topic in RARE}
-                        lacking += [f'{name}: {of} {right}' for right in
-                                    rights - used[name, of] - rare if name != ROBOT
-                                    or of != ('request', 'service')]
-                    elif STEERING[of] not in used[name, of]:
-                        lacking.append(f'{name}: {of} {STEERING[of]}')
-            return lacking
+    def wanted() -> list[str]:
+        lacking = []
+        for name in there:
+            for of, rights in policies[name].items():
+                with suppress(NodeNameNonExistentError):
+                    used[name, of] |= {end for end, _ in ends[of](name, '/')}
+                if of == ('reply', 'service') and name == security_policy.VIEWER:
+                    continue  # it has no parameters
+                if name not in (security_policy.PLAYER, security_policy.VIEWER):
+                    rare = {full(topic, name) for topic in RARE}
+                    lacking += [f'{name}: {of} {right}' for right in
+                                rights - used[name, of] - rare if name != ROBOT
+                                or of != ('request', 'service')]
+                elif STEERING[of] not in used[name, of]:
+                    lacking.append(f'{name}: {of} {STEERING[of]}')
+        return lacking
 
-        view.wait_for_output('token', RUN_S)  # before it is up it may miss an interrupt
-        ros.spin_until(lambda: not wanted(), what=lambda: str(wanted()))
-        for process in (view, walk):
-            process.interrupt()
-            process.wait(RUN_S)
+    view.wait_for_output('token', RUN_S)  # before it is up it may miss an interrupt
+    ros.spin_until(lambda: not wanted(), what=lambda: str(wanted()))
+    for process in (view, walk):
+        process.interrupt()
+        process.wait(RUN_S)
     for (name, of), seen in used.items():
         assert seen <= policies[name][of], (name, of, seen - policies[name][of])
 
