@@ -227,6 +227,6 @@ SUITE_NAMES = frozenset(field.name for kind in WALKING for cls in kind.sets
 """Names of all parameters of all parts."""
 
 NODE_NAMES = frozenset(('autostart', 'delivery', 'executor', 'expected_nodes', 'lock_step',
-                        'scheduling', 'use_sim_time', 'storage', 'output', 'topics',
+                        'return_time', 'scheduling', 'use_sim_time', 'storage', 'output', 'topics',
                         'flush_period', 'drawing_rate'))
 """Parameters that nodes have as nodes, not for their part of the core."""

@@ -104,6 +104,12 @@ WALKING_NODES: tuple[str, ...] = tuple(name for kind in WALKING for name in kind
 """Names in the graph of all nodes that walk."""
 
 
+RETURN_S = 0.8
+"""``return_time`` of nodes that are started again when they die [s]: another writer of a topic is
+believed after half a second of silence, and the robot goes on with its rhythm as safely for so
+long as it stops at once.
+"""
+
 COMPOSED = 'composed_suite'
 """Executable that runs several nodes in one process."""
 

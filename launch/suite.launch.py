@@ -21,6 +21,7 @@ from dmp_cpg_ros.suite_table import (
     PROCESSES,
     RECORDED_WALK,
     RECORDER,
+    RETURN_S,
     ROBOT,
     VISUALIZATION,
     instances,
@@ -85,6 +86,8 @@ def nodes(context: LaunchContext) -> list[Node]:
     shared = {name: str(suite.robot_file) for name in robot}
     if given['lock_step']:
         shared['lock_step'] = given['lock_step'] == 'true'
+    if given['respawn'] == 'true':
+        shared['return_time'] = RETURN_S
     recording = given['record'] == 'true'
     if recording:
         shared['expected_nodes'] = list(RECORDED_WALK)

@@ -32,7 +32,14 @@ from dmp_cpg_ros.core.maths.rounding import no_less
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.primitive_files import motion_overrides
 from dmp_cpg_ros.suite import Suite, load_suite
-from dmp_cpg_ros.suite_table import KINDS, RECORDED_WALK, RECORDER, WALKING, namespace_rules
+from dmp_cpg_ros.suite_table import (
+    KINDS,
+    RECORDED_WALK,
+    RECORDER,
+    RETURN_S,
+    WALKING,
+    namespace_rules,
+)
 
 if TYPE_CHECKING:
     from dmp_cpg_ros.commands.fork_server import ForkServer
@@ -213,6 +220,8 @@ def _run(plan: _Plan, folder: Path, server: ForkServer) -> tuple[int, list[str]]
     resolved = plan.resolved(gated=True)
     for values in resolved.values():
         values.update(lock_step=options.lock_step, expected_nodes=list(RECORDED_WALK))
+        if options.respawn and not options.lock_step:
+            values.setdefault('return_time', RETURN_S)
     resolved[RECORDER] = {'output': str(folder / 'bag'),
                           'expected_nodes': [kind.name for kind in WALKING]}
     rules = [*ros.remappings, *namespace_rules(ros.namespace)]

@@ -128,7 +128,7 @@ class CanonicalOscillators(SuiteNode):
         if gains is None:
             return
         known_ns, self._inhibition = gains
-        if self.lock_step or fresh(known_ns, stamp_ns, SILENT_NS):
+        if self.lock_step or fresh(known_ns, stamp_ns, SILENT_NS + self.return_ns):
             if self._silent is not None:
                 self._silent = None
                 self.clear('inhibition')

@@ -36,7 +36,7 @@ from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader, GaitMemoryWriter
 from dmp_cpg_ros.nodes.messages.commands import read_votes
 from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsWriter, inhibition_state
-from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.interfaces import BLIND_NS, interface
 from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES, read_drive_mode
 from dmp_cpg_ros.nodes.messages.posture_feedback import BodyReader
 from dmp_cpg_ros.nodes.messages.reference import read_reference
@@ -57,8 +57,6 @@ OVERTAKEN = 'done; another request came before it was predicted'
 UNKNOWN = 'done; it could not be predicted'
 """Begin of the answer to a request of which no time can be said."""
 
-BLIND_NS = 250_000_000
-"""Time on the robot's clock without a tick after which nothing is known of the gait [ns]."""
 
 
 class InhibitionNode(SuiteNode):
@@ -96,9 +94,10 @@ class InhibitionNode(SuiteNode):
         self._gains_publisher = self.publisher('inhibition_gains')
         self._others = OthersKnow(self, self._take_up)
         self.listen('drive_mode', self._on_drive)
-        if self.lock_step:
+        if self.lock_step or self.return_ns:
             self._memory_writer = GaitMemoryWriter(tuple(gaits.gaits))
             self._memory = self.publisher('gait_memory')
+        if self.lock_step:
             self.look_every(JOIN_EVERY_S, self._try_again)
         else:
             self.listen('/clock', lambda message: self._watch(stamp_ns(message.clock)))
@@ -163,13 +162,13 @@ class InhibitionNode(SuiteNode):
                 or balance != (before.share, before.quickness)
                 or not 0 <= stamp_ns - self._told_ns < HEARTBEAT_NS):
             self._publish_gains()
+            if self.return_ns:
+                self._publish_memory(stamp_ns)
         self._predict_what_is_new(before)  # takes several ticks, for which nobody is to wait
         if self._news() != self._told:
             self._publish()
         if self.lock_step:
-            self._memory.publish(
-                self._memory_writer.fill(
-                    stamp_ns, self._x, self._x_dot, self._slow.gait, self._r))
+            self._publish_memory(stamp_ns)
         if self._blind:
             self._blind = ''
             self.clear('blind')
@@ -272,6 +271,7 @@ class InhibitionNode(SuiteNode):
             self._blind = (f'no {topic} from {interface(topic).publishers[0]} since '
                            f'{self._state.time_ns * 1e-9:.3f} s')
             self.warn('blind', f'{self._blind}: nothing is known of the gait', error=True)
+        if self._blind and now_ns - self._state.time_ns > BLIND_NS + self.return_ns:
             self._stop_now()
         self._watch_bound(now_ns)
 
@@ -318,6 +318,8 @@ class InhibitionNode(SuiteNode):
         if self._blind:
             if stop:
                 self._state = self._supervisor.request(self._state, True)
+                self._acting = self._supervisor.inhibition(self._state)
+                self._publish_gains()
             return False, (
                 f'{self._blind}: no time to rest can be promised' + (
                     '; the stop is requested and will be carried out' if stop else ''))
@@ -384,6 +386,10 @@ class InhibitionNode(SuiteNode):
     def _publish_gains(self) -> None:
         self._told_ns = self._state.time_ns
         self._gains_publisher.publish(self._gains_writer.fill(self._told_ns, self._acting))
+
+    def _publish_memory(self, stamp_ns: int) -> None:
+        self._memory.publish(self._memory_writer.fill(
+            stamp_ns, self._x, self._x_dot, self._slow.gait, self._r))
 
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()

@@ -79,9 +79,11 @@ class LegTransformation(SuiteNode):
             self.clear('feedback')
             if not feedback.command.balanced:  # the drives may have moved the joints meanwhile
                 self._state, elapsed = self._leg.initial_state(), 0.0
+            elif self.return_ns:
+                self._joined = False
         if not self._joined:
             self._joined = True
-            if self.lock_step and stamp_ns > 0:
+            if (self.lock_step or self.return_ns) and stamp_ns > 0:
                 self._state = self._leg.picked_up(gait, x, x_dot, values['reference'], feedback)
         state, targets = self._leg.step(
             self._state, gait, x, x_dot, values['reference'], feedback, position, velocity,

@@ -61,12 +61,14 @@ class ReferenceFilter(SuiteNode):
         """Advance the filter to the stamp of the robot's state."""
         dt, wanted = self.elapsed, self.parameters_of(CanonicalParameters).cadence_scale
         if known := self._memory.take(stamp_ns):
-            dt, (*_, self._r) = known
+            since_s, (*_, self._r) = known
+            dt = since_s if self.lock_step else 0.0  # the command is not known yet
         self._cadence = approached(self._cadence, wanted, dt)
         command, gains = self._gate.at(stamp_ns), values['inhibition_gains']
         if gains is not None:
             self._inhibition = gains[1]
-            if not (self.lock_step or fresh(gains[0], stamp_ns, SILENT_NS)):
+            if not (self.lock_step or fresh(
+                    gains[0], stamp_ns, SILENT_NS + self.return_ns)):
                 self._inhibition = replace(gains[1], requested=True)
         self._r = self._system.towards(self._r, command, self._inhibition, dt)
         self._publisher.publish(self._writer.fill(stamp_ns, self._r))

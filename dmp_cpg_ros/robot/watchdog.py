@@ -59,6 +59,12 @@ LONGEST_STOP_S = 1.6
 NEAR, SLOW = 0.3, 0.3
 """Distance [rad] and speed [rad/s] within which targets are at rest where the joints are held."""
 
+APART, AHEAD_S = 0.2, 0.1
+"""How far legs that come back to a robot in motion may be from its rhythm [rad], and in how much
+time they must not be three times as far [s]: feet touch down a little earlier or later. Those that
+had not been away were so by 0.10 rad and 0.43 rad at most, a robot's stance by 0.38 and 0.72 rad.
+"""
+
 STEPPED = 0.7
 """That distance for a robot that stands: its legs may rest on footholds a step away [rad]."""
 
@@ -97,6 +103,8 @@ class CommandWatchdog:
         Time after their stamp for which targets were computed [ns].
     tick_ns : int
         Time between two targets of a leg [ns]; 0: it does not look at what is lost.
+    return_ns : int
+        How much longer it goes on with the rhythm of a walk, for nodes that may come back [ns].
 
     Attributes
     ----------
@@ -114,8 +122,9 @@ class CommandWatchdog:
     """
 
     def __init__(self, description: RobotDescription, timeout_ns: int, lead_ns: int = 0,
-                 tick_ns: int = 0) -> None:
+                 tick_ns: int = 0, return_ns: int = 0) -> None:
         """Start without targets."""
+        self._return_ns = return_ns
         self._losses = [TargetLoss(tick_ns, timeout_ns) for _ in LEGS]
         self._watches = [TargetWatch(leg, timeout_ns) for leg in description.legs]
         self._losing = False
@@ -133,7 +142,7 @@ class CommandWatchdog:
         self._rhythm: Rhythm | None = None
         self._given, self._off = np.zeros(12), np.zeros(12)
         self._begin_ns = self._late_ns = self._uneasy_ns = self._taken_ns = 0
-        self._taking_s = TAKEN_UP_S
+        self._taking_s, self._stop_s = TAKEN_UP_S, 0.0
         self._lagged_ns = -1
         self.lateness_ns = self.ticks = self.carried = 0
         self._start = self._targets
@@ -153,13 +162,14 @@ class CommandWatchdog:
         """Legs whose targets are missing or too old; all, where they are late all the time, or
         too many are lost.
         """
-        late = 0 < self._late_ns < now_ns - LATE_NS
-        return list(LEGS) if late or self._losing else self.unheard(now_ns)
+        more_ns = self._return_ns if self._late_ns and self._rhythm else 0
+        late = 0 < self._late_ns < now_ns - LATE_NS - more_ns
+        return list(LEGS) if late or self._losing else self.unheard(now_ns, more_ns)
 
-    def unheard(self, now_ns: int) -> list[str]:
-        """Legs whose targets are missing or too old."""
+    def unheard(self, now_ns: int, more_ns: int = 0) -> list[str]:
+        """Legs whose targets are missing or too old, by more than some time [ns]."""
         return [leg for leg, stamp in zip(LEGS, self.stamps, strict=True)
-                if stamp is None or now_ns - stamp > self._timeout_ns]
+                if stamp is None or now_ns - stamp > self._timeout_ns + more_ns]
 
     def doubted(self, now_ns: int) -> list[str]:
         """Legs whose targets jump, or repeat while they move, or did so a moment ago."""
@@ -221,6 +231,9 @@ class CommandWatchdog:
             position += 1e-9 * np.clip(late, 0, CARRIED_NS) * velocity
         if self._lagged_ns >= now - (IN_TIME_NS if self._late_ns else 0):
             return JointTargets(*self._going_on(now, np.array((position, velocity, effort))))
+        if (self._return_ns and 0 < self._late_ns < now - self._timeout_ns
+                and self._elsewhere(now, position, velocity)):
+            return self._falling_back(state)
         if self._late_ns:
             self._late_ns, self._taken_ns, self._off = 0, now, self._given - position
             self._taking_s = TAKEN_UP_S
@@ -234,6 +247,14 @@ class CommandWatchdog:
         """
         return bool(self._late_ns and self._rhythm is None and self.lateness_ns > HELD_NS
                     and np.abs(self._targets[1]).max() > SLOW)
+
+    def _elsewhere(self, now: int, position: Array, velocity: Array) -> bool:
+        """Whether legs that have come back are, or are about to be, elsewhere in the gait than the
+        robot, which would be torn out of its stride.
+        """
+        rhythm = self._going_on(now, np.array((position, velocity, velocity)))
+        off, rate = position - rhythm[0], velocity - rhythm[1]
+        return bool(np.abs(off).max() > APART or np.abs(off + AHEAD_S * rate).max() > 3.0 * APART)
 
     def _take_what_acts(self, now: int) -> list[int]:
         """Take of each leg the newest targets whose time has come; return their ages [ns]."""
@@ -265,8 +286,9 @@ class CommandWatchdog:
         """
         position, velocity, _ = self._targets
         near = STEPPED if self.fallback == 'stand' else NEAR
-        if (np.abs(velocity).max() > SLOW or np.abs(position - self._given).max() > near
-                or self.lateness_ns > CARRIED_NS):
+        stopping = self._rhythm is not None and now - self._begin_ns < 1e9 * self._stop_s
+        if (stopping or np.abs(velocity).max() > SLOW or self.lateness_ns > CARRIED_NS
+                or np.abs(position - self._given).max() > near):
             self._uneasy_ns = now
         return now - self._uneasy_ns >= AT_EASE_NS
 
@@ -296,7 +318,10 @@ class CommandWatchdog:
         start = np.array((self._given if known else state.joint_position, *np.zeros((2, 12))))
         if known and not self._late_ns and not limp:
             self._going_on(now, start)
-        self._begin_ns, self._late_ns, self._start = now, 0, start
+        self._begin_ns = self._uneasy_ns = now
+        self._late_ns, self._start = 0, start
+        if self._rhythm is not None:
+            self._stop_s = min(STOP_CYCLES * self._rhythm.period_s, LONGEST_STOP_S)
         self._off = self._given - self._rhythm.at(now)[0] if self._rhythm else np.zeros(12)
 
     def _taking_up(self, posture: str, ahead_ns: int, state: RobotState) -> Array:
@@ -313,8 +338,7 @@ class CommandWatchdog:
     def _coming_to_a_stand(self, rhythm: Rhythm, state: RobotState) -> JointTargets:
         """The last rhythm about the stance, smaller and smaller."""
         now, goal = state.time_ns, self._ways['stand'][0]
-        seconds = min(STOP_CYCLES * rhythm.period_s, LONGEST_STOP_S)
-        ahead = now - self._begin_ns
+        seconds, ahead = self._stop_s, now - self._begin_ns
         size, rate = 1.0 - _share(ahead, seconds), -_share(ahead, seconds, 1) / seconds
         position, velocity, effort = rhythm.at(now)
         away = position + (1.0 - _share(ahead, TAKEN_UP_S)) * self._off - goal

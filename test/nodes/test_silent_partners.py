@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -24,16 +25,17 @@ from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework.known_stop import BRIEF_NS, PATIENT_NS
 from dmp_cpg_ros.nodes.inhibition import HEARTBEAT_NS, InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
-from dmp_cpg_ros.nodes.messages.inhibition import read_state_word
-from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
+from dmp_cpg_ros.nodes.messages.canonical_state import GaitMemoryWriter
+from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader, read_state_word
+from dmp_cpg_ros.nodes.messages.interfaces import BLIND_NS, SILENT_NS
 from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES
 from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
 from dmp_cpg_ros.nodes.posture_control import PostureControl
 from dmp_cpg_ros.nodes.reference_filter import ReferenceFilter
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
-from dmp_cpg_ros.suite import load_suite
-from dmp_cpg_ros.suite_table import ROBOT
+from dmp_cpg_ros.suite import load_gaits, load_suite
+from dmp_cpg_ros.suite_table import RETURN_S, ROBOT
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.robot.model_reader import load_description
@@ -65,11 +67,12 @@ def tick_at(node: InhibitionNode, state: RobotState, tick: Any, after_ns: int = 
 
 
 def watching(ros: Ros, *acting: tuple[str, int, Inhibition], wait_ns: int = PATIENT_NS,
-             lock_step: bool = False) -> tuple[InhibitionNode, int]:
+             lock_step: bool = False, parameters: Sequence[Parameter] = ()
+             ) -> tuple[InhibitionNode, int]:
     """A node that is started while the robot walks, with what others tell of the stop."""
     _, state, tick = walked(300)
     node = InhibitionNode('inhibition', context=ros.context, parameter_overrides=[
-        Parameter('lock_step', value=lock_step)])
+        Parameter('lock_step', value=lock_step), *parameters])
     node.start()
     for who, stamp_ns, what in acting:
         node._others.hear(who, stamp_ns, what)
@@ -316,6 +319,86 @@ def test_reference_and_oscillators_stop_without_the_inhibition(ros: Ros) -> None
     assert not canonical._inhibition.requested
     for node in (reference, canonical):
         node.destroy_node()
+
+
+RETURNS = [Parameter('return_time', value=RETURN_S)]
+RETURN_NS = round(1e9 * RETURN_S)
+
+
+def test_who_may_come_back_is_waited_for_before_the_gait_stops(ros: Ros) -> None:
+    reference = ReferenceFilter('reference_filter', context=ros.context,
+                                parameter_overrides=RETURNS)
+    canonical = CanonicalOscillators('canonical_oscillators', context=ros.context,
+                                     parameter_overrides=RETURNS)
+    for node in (reference, canonical):
+        ros.nodes.append(node)
+        node.start()
+    for age in (SILENT_NS + TICK, SILENT_NS + RETURN_NS, SILENT_NS + RETURN_NS + TICK):
+        reference.on_tick(age, {'joint_states': None, 'inhibition_gains': (0, RUNS)})
+        canonical.on_tick(age, {'reference': np.zeros(3), 'inhibition_gains': (0, RUNS)})
+        silent = age > SILENT_NS + RETURN_NS
+        assert reference._inhibition.requested == canonical._inhibition.requested == silent
+
+
+def test_a_stop_that_is_asked_for_while_nothing_is_known_of_the_gait_acts_at_once(ros: Ros
+                                                                                  ) -> None:
+    node, now = watching(ros, KNOWN, parameters=RETURNS)
+    node._watch(now + BLIND_NS + TICK)
+    assert node.health.has_problem('blind') and not node._state.requested
+    told: list[Any] = []
+    node._gains_publisher.publish = told.append  # type: ignore[method-assign]
+    accepted, answer = node._take_request(SetBool.Request(data=True))
+    assert not accepted and 'no time to rest can be promised' in answer
+    assert InhibitionGainsReader().read(told[-1]).requested
+    node._state = replace(node._state, requested=False)
+    node._watch(now + BLIND_NS + RETURN_NS)
+    assert not node._state.requested
+    node._watch(now + BLIND_NS + RETURN_NS + TICK)
+    assert node._state.requested and node._state.automatic
+    node.destroy_node()
+
+
+@pytest.mark.parametrize('parameters', [[], RETURNS])
+def test_the_gait_is_remembered_for_nodes_that_may_come_back(
+        ros: Ros, parameters: list[Parameter]) -> None:
+    node, _ = watching(ros, KNOWN, parameters=parameters)
+    remembered: list[Any] = []
+    if parameters:
+        node._memory.publish = remembered.append  # type: ignore[method-assign]
+    else:
+        assert not hasattr(node, '_memory')
+    _, state, tick = walked(300)
+    for k in range(101):
+        tick_at(node, state, tick, PATIENT_NS + k * TICK)
+    assert len(remembered) == (4 if parameters else 0)
+    node.destroy_node()
+
+
+@pytest.mark.parametrize(('silent', 'goes_on'), [(150, True), (280, False)])
+def test_oscillators_and_reference_that_come_back_in_time_go_on_in_phase(
+        ros: Ros, silent: int, goes_on: bool) -> None:
+    """As those would have that had not been away."""
+    loop, before, tick = walked(750)
+    robot = PerfectTrackingRobot(load_description(SUITE.robot_file), TICK, 'standing')
+    canonical = CanonicalOscillators('canonical_oscillators', context=ros.context,
+                                     parameter_overrides=RETURNS)
+    reference = ReferenceFilter('reference_filter', context=ros.context,
+                                parameter_overrides=RETURNS)
+    message = GaitMemoryWriter(tuple(load_gaits())).fill(
+        before.time_ns, tick.x, tick.x_dot, tick.gait, tick.r)
+    state = robot.reset(before.time_ns)
+    for _ in range(silent + 1):
+        stamp, then = state.time_ns, loop.tick(state)
+        state = robot.step(then.targets)
+    for node, inputs in ((canonical, {'reference': then.r}), (reference, {'joint_states': None})):
+        ros.nodes.append(node)
+        node.start()
+        node._memory._kept.append(message)
+        node.elapsed = 0.0
+        node.on_tick(stamp, {**inputs, 'inhibition_gains': (stamp, RUNS)})
+    off = np.abs(canonical._state.x - then.x).max()
+    assert (off < 0.01 and np.allclose(reference._r, then.r, atol=1e-3)) if goes_on else (
+        off > 0.1 and not reference._r.any())
 
 
 def test_gains_of_before_a_clock_that_was_set_back_are_those_of_a_silent_inhibition(ros: Ros

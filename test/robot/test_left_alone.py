@@ -21,22 +21,26 @@ from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.suite import load_gaits, load_suite
+from dmp_cpg_ros.suite_table import RETURN_S
 
 PHASES, STOOD = 16, 100
 """Phases in which it is left alone, and ticks after which it stands."""
 
 TIMEOUT_NS = 200_000_000
 
+RETURN_NS = round(1e9 * RETURN_S)
+
 
 class Walk:
     """A walk in the plain loop whose targets pass the watchdog."""
 
-    def __init__(self, gait: str, speed: float) -> None:
+    def __init__(self, gait: str, speed: float, return_ns: int = 0) -> None:
         suite = load_suite(None, {'gait': gait, 'auto_inhibit': False, 'cmd_vel_timeout': 0.0})
         self.robot = MujocoRobot(suite.robot_file, suite.tick_ns, 0)
         self.loop = WalkingLoop(
             self.robot.description, suite.gait, suite.parameters, load_gaits())
-        self.guard = CommandWatchdog(self.robot.description, TIMEOUT_NS)
+        self.guard = CommandWatchdog(
+            self.robot.description, TIMEOUT_NS, return_ns=return_ns)
         self.state: RobotState = self.robot.reset()
         self.phase = 0.0
         self.go(1)
@@ -95,6 +99,45 @@ def test_silent_while_it_speeds_up_it_puts_its_feet_down(gait: str, speed: float
         assert walk.go(40).left_alone(500) < 0.6
 
 
+@pytest.mark.parametrize(('gait', 'speed'), [('amble', 0.5), ('trot', 1.0), ('trot', 1.5)])
+@pytest.mark.parametrize('silent', ['fl', 'fl fr rl rr'])
+def test_legs_that_are_back_in_time_are_followed_without_a_stop(
+        gait: str, speed: float, silent: str) -> None:
+    walk = Walk(gait, speed, RETURN_NS).go(750)
+    for ticks in (60, 120, 170, 220):  # up to 0.88 s, in another phase each time
+        walk.go(ticks, silent)
+        assert not walk.guard.fallback
+        assert ticks * 4_000_000 <= TIMEOUT_NS or walk.guard.unheard(walk.state.time_ns)
+        slowest = np.inf
+        for _ in range(300):
+            walk.go(1)
+            slowest = min(slowest, float(walk.state.base_velocity_in_base[0]))
+            assert not (walk.guard.fallback or walk.robot.fallen)
+        assert not walk.guard.silent(walk.state.time_ns) and slowest > 0.5 * speed
+
+
+def test_legs_that_are_not_back_in_time_are_waited_for_no_longer() -> None:
+    walk = Walk('trot', 1.0, RETURN_NS).go(750)
+    last_ns = walk.state.time_ns
+    while not walk.guard.fallback:
+        walk.go(1, 'fl')
+    assert walk.state.time_ns - last_ns == pytest.approx(TIMEOUT_NS + RETURN_NS, abs=1e7)
+    assert walk.left_alone(600) < 0.3
+
+
+def test_legs_that_come_back_elsewhere_in_the_gait_are_not_followed() -> None:
+    """Else the feet of a robot in motion would stop below it."""
+    walk = Walk('trot', 1.0, RETURN_NS).go(750).go(150, 'fl fr rl rr')
+    home = home_joint_position(walk.robot.description)
+    for _ in range(20):
+        for i, leg in enumerate(LEGS):
+            walk.guard.accept(leg, walk.state.time_ns, JointTargets(
+                home[3 * i:3 * i + 3], np.zeros(3), np.zeros(3)))
+        walk.state = walk.robot.step(walk.guard.targets(walk.state))
+    assert walk.guard.fallback == 'stand'
+    assert walk.left_alone(600) < 0.3
+
+
 def test_it_follows_the_legs_again_once_they_are_at_rest() -> None:
     walk = Walk('amble', 0.5).go(750).go(100, silent='fl')
     assert walk.guard.fallback == 'stand'
@@ -111,7 +154,7 @@ def test_it_follows_the_legs_again_once_they_are_at_rest() -> None:
 
 def test_it_follows_legs_that_rest_on_footholds_a_step_away() -> None:
     """Inhibited legs stay on their footholds, and the robot stands on others by itself."""
-    walk = Walk('amble', 0.5).go(750).go(200, silent='fl')
+    walk = Walk('amble', 0.5).go(750).go(320, silent='fl')  # after which it stands
     assert walk.guard.fallback == 'stand'
     description = walk.robot.description
     for leg, shift in product(LEGS, ((0.1, 0.0), (-0.1, 0.0), (0.05, 0.05), (0.05, -0.05))):

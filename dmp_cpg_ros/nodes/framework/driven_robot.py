@@ -58,7 +58,7 @@ class DrivenRobot(SuiteNode):
         self._guard = CommandWatchdog(self._description, round(p.target_timeout * 1e9),
                                       round(p.target_lead * 1e9),
                                       self.parameters_of(TickParameters).tick_ns
-                                      if self.lossy else 0)
+                                      if self.lossy else 0, self.return_ns)
         self._guard.drives.watches = self.has_drives
 
     @property

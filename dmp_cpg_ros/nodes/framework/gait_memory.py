@@ -10,14 +10,16 @@ from typing import TYPE_CHECKING, Any
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.nodes.messages.canonical_state import GaitMemoryReader
+from dmp_cpg_ros.nodes.messages.interfaces import BLIND_NS
 from dmp_cpg_ros.nodes.messages.values import header_ns
 
 if TYPE_CHECKING:
     from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 
 FRESH_NS = 20_000_000
-"""Age up to which a memory of the gait is where a restarted node goes on [ns]: within it the robot
-has not moved, which waits in lock-step."""
+"""In lock-step: age up to which a restarted node goes on from a memory of the gait [ns]. Within it
+the robot has not moved, which waits; in real time the gait goes on without the node for longer.
+"""
 
 
 class GaitMemory:
@@ -37,6 +39,7 @@ class GaitMemory:
         self._kept: deque[Any] = deque(maxlen=1)
         self._heard = node.listen('gait_memory', self._kept.append)
         self._asked = False
+        self._fresh_ns = node.return_ns + BLIND_NS if node.return_ns else FRESH_NS
 
     def take(self, stamp_ns: int) -> tuple[float, Any] | None:
         """At the first tick: the time since the memory [s] and what it says, if it is of the
@@ -49,7 +52,7 @@ class GaitMemory:
             self._node.leave(self._heard)
         for message in self._kept:
             age = stamp_ns - header_ns(message)
-            if 0 <= age <= FRESH_NS:
+            if 0 <= age <= self._fresh_ns:
                 try:
                     return 1e-9 * age, self._reader.read(message)
                 except DataError as error:

@@ -72,6 +72,10 @@ class LockStepParameters(Parameters):
 
     lock_step: bool = parameter(
         False, 'whether ticks wait for all their inputs instead of for the wall clock')
+    return_time: float = parameter(
+        0.0, 'real time: how much longer than otherwise the gait goes on without a node that may '
+        'come back; walk --respawn and the launch file with respawn:=true set it', 0.0, 2.0,
+        unit='s')
 
 
 class ParameterTable:

@@ -131,6 +131,13 @@ class SuiteNode(ConnectedNode):
         own = self._sets.get(parameters.LockStepParameters)
         return own is not None and cast(parameters.LockStepParameters, own).lock_step
 
+    @property
+    def return_ns(self) -> int:
+        """How much longer than otherwise the gait goes on without a node [ns]."""
+        own = self._sets.get(parameters.LockStepParameters)
+        return 0 if own is None or self.lock_step else round(
+            1e9 * cast(parameters.LockStepParameters, own).return_time)
+
     def parameters_of(self, parameter_set: type[P]) -> P:
         """Return the values in effect of one parameter set."""
         return cast(P, self._sets[parameter_set])

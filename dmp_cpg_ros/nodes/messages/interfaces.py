@@ -237,7 +237,8 @@ TOPICS: tuple[Interface, ...] = (
               'the newest of acting_gains: who restarts inhibition and the oscillators finds it',
               (ROBOT,), (INHIBITION,), latched=True, recorded=False),
     Interface('gait_memory', JointState,
-              'lock-step: canonical_state and reference of the last tick, for who is restarted',
+              'canonical_state and reference, for who is restarted: in lock-step of every tick, '
+              'with return_time ten times a second',
               (INHIBITION,), (REFERENCE, CANONICAL), latched=True,
               sometimes=(REFERENCE, CANONICAL, INHIBITION)),
     Interface('drive_mode', String,
@@ -279,6 +280,9 @@ SHARED = ('/diagnostics', '/tf', '/tf_static')
 
 SILENT_NS = 500_000_000
 """Age of the newest ``inhibition_gains`` from which inhibition counts as gone [ns]."""
+
+BLIND_NS = 250_000_000
+"""Time on the robot's clock without a tick after which nothing is known of the gait [ns]."""
 
 REPEATED = ('reference', 'canonical_state', 'posture_feedback', 'joint_targets',
             'inhibition_gains')
