@@ -1,11 +1,11 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How long a writer waits in ``publish`` while readers come, and are killed.
+"""How long a writer waits in ``publish`` while readers come, and are killed, and they for it.
 
 One process publishes states of twelve joints some thousand times a second; others begin to read
-them, and end after some seconds by SIGKILL. With the profile of the suite (config/fastdds.xml),
-and with the transports that rmw_fastrtps takes by itself, shared memory among them. Exit status 1
-when the former waited long.
+them, say how long it took until they heard it, and end after some seconds by SIGKILL. With the
+profile of the suite (config/fastdds.xml), and with the transports that rmw_fastrtps takes by
+itself, shared memory among them. Exit status 1 when with the former the writer waited long.
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
+from math import inf
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
+from statistics import median
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.nodes.framework.execution import (
@@ -32,7 +34,7 @@ from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of, 
 
 WAYS = ('suite', 'default')
 
-READERS, LIFE_S = 3, (1.5, 3.0)
+READERS, LIFE_S = 3, (4.0, 6.0)
 """Readers at one time, and how long each lives [s]."""
 
 PAUSE_S = 3e-4
@@ -52,15 +54,23 @@ def _enter(way: str, domain: int) -> None:
         prepare_middleware()
 
 
-def _read(way: str, domain: int) -> None:
-    """Body of a reader: it reads until it is killed."""
+def _read(way: str, domain: int, end: Connection) -> None:
+    """Body of a reader: it says when it hears the writer, and reads until it is killed."""
     import rclpy
     from sensor_msgs.msg import JointState
 
     _enter(way, domain)
     rclpy.init()
     node = rclpy.create_node(f'reader_{os.getpid()}')
-    node.create_subscription(JointState, TOPIC, lambda _: None, 10)
+    begin, heard = time.monotonic(), False
+
+    def hear(_: JointState) -> None:
+        nonlocal heard
+        if not heard:
+            heard = True
+            end.send(time.monotonic() - begin)
+
+    node.create_subscription(JointState, TOPIC, hear, 10)
     executor = make_executor('events')
     executor.add_node(node)
     executor.spin_until_future_complete(rclpy.task.Future(), timeout_sec=1e6)
@@ -85,34 +95,39 @@ def _write(way: str, domain: int, end: Connection) -> None:
     end.send((count, waits))
 
 
-def measure(way: str, readers: int, domain: int, rng: random.Random) -> tuple[int, list[float]]:
-    """Let readers come and be killed; returns the number of messages, and the long waits [s]."""
+def measure(way: str, readers: int, domain: int, rng: random.Random
+            ) -> tuple[int, list[float], list[float]]:
+    """Let readers come and be killed; returns the number of messages, the long waits, and how long
+    each reader waited for its first message [s].
+    """
     context = get_context('spawn')
     ours, theirs = context.Pipe()
     writer = context.Process(target=_write, args=(way, domain, theirs))
     writer.start()
-    living, begun = dict[SpawnProcess, float](), 0
+    living, begun, heard = dict[SpawnProcess, tuple[float, Connection]](), 0, list[float]()
     while living or begun < readers:
         while len(living) < READERS and begun < readers:
             begun += 1
-            reader = context.Process(target=_read, args=(way, domain))
+            mine, its = context.Pipe()
+            reader = context.Process(target=_read, args=(way, domain, its))
             reader.start()
-            living[reader] = time.monotonic() + 1.0 + rng.uniform(*LIFE_S)
-        for reader in [one for one, end in living.items() if time.monotonic() > end]:
+            living[reader] = time.monotonic() + 1.0 + rng.uniform(*LIFE_S), mine
+        for reader in [one for one, (end, _) in living.items() if time.monotonic() > end]:
             assert reader.pid is not None
             os.kill(reader.pid, signal.SIGKILL)
             reader.join()
-            del living[reader]
+            _, mine = living.pop(reader)
+            heard.append(mine.recv() if mine.poll() else inf)
         time.sleep(rng.uniform(0.001, 0.02))
     ours.send(None)
     count, waits = ours.recv()
     writer.join()
-    return count, waits
+    return count, waits, heard
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    parser = parser_of('joining_readers', __doc__, 'the long waits', jobs=False)
+    parser = parser_of('joining_readers', __doc__, 'all long waits', jobs=False)
     parser.add_argument('--readers', type=at_least_one, default=100, metavar='N',
                         help='with either profile (default: 100)')
     parser.add_argument('--seed', type=int, default=0, help='of the moments (default: 0)')
@@ -124,10 +139,13 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
     measured = {way: measure(way, options.readers, domain, random.Random(options.seed))
                 for way in WAYS}
     print(markdown_table(
-        ('transports', 'readers', 'messages', f'waits above {LONG_S:g} s', 'longest, s'),
-        [(way, str(options.readers), f'{count:,}', str(len(waits)), f'{max(waits, default=0):.2f}')
-         for way, (count, waits) in measured.items()]))
-    write_results(options.json, {way: waits for way, (_, waits) in measured.items()})
+        ('profile', 'readers', 'messages', f'waits above {LONG_S:g} s', 'longest, s',
+         'a reader waits for the first message, s: median, longest'),
+        [(way, str(options.readers), f'{count:,}', str(len(waits)),
+          f'{max(waits, default=0):.2f}', f'{median(heard):.2f}, {max(heard):.2f}')
+         for way, (count, waits, heard) in measured.items()]))
+    write_results(options.json, {way: {'waits_s': waits, 'heard_s': heard}
+                                 for way, (_, waits, heard) in measured.items()})
     return int(bool(measured['suite'][1]))
 
 
