@@ -54,6 +54,9 @@ MAKE_UP_NS = 100_000_000
 CLOCK_EVERY = 4
 """In real time ``/clock`` ticks with every so many states: the suite itself goes by stamps."""
 
+TURN_TICKS = 25
+"""In lock-step, where all nodes share a process: how often in ticks its executor has its turn."""
+
 VOTING_TOPICS = ('imu', 'foot_contacts')
 """What the inhibition reads when sensors can vote."""
 
@@ -302,10 +305,20 @@ class MujocoRobotNode(DrivenRobot):
         self._go_on()
 
     def _go_on(self) -> None:
-        if self.lock_step:
+        """Begin the next tick; where all nodes share a process the executor has its turn now and
+        then, as their ticks are worked off within one callback.
+        """
+        now = self._state.time_ns
+        if not self.lock_step:
+            self._start_real_time()
+        elif self.local is None or self.executor is None or now // self._tick_ns % TURN_TICKS:
             self._publish_state()
         else:
-            self._start_real_time()
+            def begin() -> None:
+                if self.active and self._state.time_ns == now:
+                    self._publish_state()
+
+            self.executor.create_task(self.guarded('gate', begin))
 
     # Real time -----------------------------------------------------------------------------------
 

@@ -23,6 +23,7 @@ pytest.importorskip('rclpy')
 import rclpy
 import ros_processes
 from ros_processes import RUN_S, SHARED_HZ, NodeProcess, Processes, Ros, wait_until
+from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.analysis.bag import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
@@ -32,6 +33,7 @@ from dmp_cpg_ros.commands.ros_arguments import RosArguments
 from dmp_cpg_ros.commands.suite_domain import alone_in_domain
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError, claim
+from dmp_cpg_ros.suite_table import WALKING_NODES
 
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
 
@@ -195,6 +197,19 @@ def test_whatever_ends_walk_ends_its_nodes_and_closes_the_bag(
                what=lambda: f'the end of {[pid for pid in nodes if alive(pid)]}')
     assert (tmp_path / 'run' / 'bag' / 'metadata.yaml').is_file()
     assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 0
+
+
+def test_nodes_of_one_process_answer_and_end_while_the_gate_is_open_for_long(
+        processes: Processes, ros: Ros, tmp_path: Path) -> None:
+    process = walk(processes, 'stand_by', '--lock-step', '--composed', '--no-report', '--out',
+                   str(tmp_path / 'run'), '--rate', str(SHARED_HZ))
+    process.wait_for_output('  at rest\n', RUN_S)
+    assert all(ros.call(Trigger, f'/{name}/ready', Trigger.Request()).success
+               for name in WALKING_NODES for _ in range(2))
+    process.signal(signal.SIGTERM)
+    assert process.wait(RUN_S) == 128 + signal.SIGTERM, str(process)
+    assert 'had to kill' not in process.output
+    assert load_recording(tmp_path / 'run' / 'bag').joints.time[-1] < 250.0
 
 
 def test_a_walk_goes_on_without_its_recorder_and_says_so_at_once(

@@ -23,8 +23,8 @@ class LocalDelivery:
     """Readers by topic, and the queue of what is under way.
 
     A writer refills its message only at its next tick, so readers must have used it by then. The
-    queue is worked off within the first :meth:`publish`; a lock-step robot must therefore hold its
-    gate now and then, or the executor would never have its turn.
+    queue is worked off within the first :meth:`publish`; a lock-step robot must therefore wait now
+    and then, or the executor would never have its turn.
 
     Parameters
     ----------
