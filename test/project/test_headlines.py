@@ -18,6 +18,7 @@ from headlines import (
     table_of_studies,
     tables,
 )
+from headlines_of_commands import DEFAULTS, OPTIONS, options_of
 
 from dmp_cpg_ros.configuration import find_config, load_yaml
 
@@ -83,6 +84,26 @@ def test_a_headline_has_no_number_that_its_document_has_not(study: str) -> None:
     title, headline, command = ROWS[study]
     links = re.findall(r'\]\(([^)]+#[^)]+)\)', title + command)
     assert set(numbers(headline)) <= told('\n'.join(map(section, links)))
+
+
+@pytest.mark.parametrize('study', OPTIONS)
+def test_a_command_has_the_options_with_which_its_file_was_written(study: str) -> None:
+    given, written = options_of(ROWS[study][2]), OPTIONS[study](content(study))
+    assert {name: given.get(name, DEFAULTS.get(name)) for name in written} == written
+
+
+@pytest.mark.parametrize('study', ROWS)
+def test_an_option_that_no_file_holds_is_that_of_the_document(study: str) -> None:
+    title, _, command = ROWS[study]
+    known = OPTIONS[study](content(study)) if study in OPTIONS else {}
+    text = '\n'.join(map(section, re.findall(r'\]\(([^)]+#[^)]+)\)', title + command)))
+    assert [name for name, value in options_of(command).items() if name not in known
+            and not re.search(rf'(?<![\w-]){name} ?{re.escape(value)}(?![\w.])', text)] == []
+
+
+def test_options_are_read_from_the_commands_of_a_cell() -> None:
+    assert options_of("`make x ARGS='--tables pushes rough --seeds 20'`; `y --all --seed 3`") == {
+        '--tables': 'pushes rough', '--seeds': '20', '--all': '', '--seed': '3'}
 
 
 def test_the_other_numbers_of_the_readme_are_those_of_the_scenarios() -> None:
