@@ -5,10 +5,13 @@
 from __future__ import annotations
 
 import re
+import shlex
 from typing import Any
 
 import pytest
+from checkout import ROOT, modules, setup_constant
 from headlines import (
+    BENCHMARK,
     README,
     STUDIES,
     content,
@@ -20,7 +23,7 @@ from headlines import (
 )
 from headlines_of_commands import DEFAULTS, OPTIONS, options_of
 
-from dmp_cpg_ros.configuration import find_config, load_yaml
+from dmp_cpg_ros.configuration import SCENARIOS, find_config, load_yaml
 
 ROWS = table_of_studies()
 NUMBER = r'\d+(?:,\d{3})*(?:\.\d+)?'
@@ -99,6 +102,34 @@ def test_an_option_that_no_file_holds_is_that_of_the_document(study: str) -> Non
     text = '\n'.join(map(section, re.findall(r'\]\(([^)]+#[^)]+)\)', title + command)))
     assert [name for name, value in options_of(command).items() if name not in known
             and not re.search(rf'(?<![\w-]){name} ?{re.escape(value)}(?![\w.])', text)] == []
+
+
+@pytest.mark.parametrize('study', ROWS)
+def test_the_commands_of_a_row_exist(study: str) -> None:
+    named = [shlex.split(command) for command in re.findall(r'`([^`]+)`', ROWS[study][2])]
+    assert named
+    for words in named:
+        match words:
+            case ['make', target, *_]:
+                makefile = (ROOT / 'Makefile').read_text(encoding='utf-8')
+                assert re.search(rf'^{target}:', makefile, re.MULTILINE), words
+            case ['python', '-m', module, *_]:
+                assert module in modules(), words
+            case ['pytest', file]:
+                assert (ROOT / file).is_file(), words
+            case ['walk', scenario]:
+                assert find_config(scenario, SCENARIOS).is_file()
+            case _:
+                assert words[0] in setup_constant('EXECUTABLES'), words
+
+
+def test_the_rate_names_the_command_that_writes_the_table_of_its_factor() -> None:
+    text = BENCHMARK.read_text(encoding='utf-8')
+    (writer,) = (command for command, table in re.findall(
+        r'<!-- (.+): begin -->(.*)<!-- \1: end -->', text, re.DOTALL)
+        if 'idle: real-time factor' in table)
+    first, *_ = re.findall(r'`([^`]+)`', ROWS['rate'][2])
+    assert first == writer
 
 
 def test_options_are_read_from_the_commands_of_a_cell() -> None:
