@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -80,6 +81,39 @@ def test_falls_by_pushes_and_of_strange_robots_are_told() -> None:
     results = content('other-robots')
     results['robots'][-1]['outcome']['stop_falls'] = 2
     assert told_of('other-robots', results).endswith('2 falls in stops')
+
+
+def test_what_was_asked_for_is_that_of_the_cases() -> None:
+    def told_of(anchor: str, change: Callable[[Any], None]) -> str:
+        results, headline = content(anchor), STUDIES[anchor].headline
+        change(results)
+        assert headline is not None
+        return headline(results)
+
+    def higher(results: Any) -> None:
+        for one in next(iter(results.values())):
+            one['case']['numbers'] = {name: 2 * number if name == 'height' else number
+                                      for name, number in one['case']['numbers'].items()}
+
+    def weaker(results: Any) -> None:
+        for one in results['mismatch']:
+            one['case']['values'] = [
+                [name, [0.3 if part == 0.4 else part for part in value]
+                 if name == 'joint_strength' else value] for name, value in one['case']['values']]
+
+    def shorter(results: Any) -> None:
+        for one in results:
+            one['seconds'] /= 2.0
+
+    def faster(runs: Any) -> None:
+        for one in runs.values():
+            one['timing']['rate_hz'] *= 2.0
+
+    assert ' blocks of 10 cm, slopes of 15°, steps of 16 cm, ' in told_of('rough-ground', higher)
+    assert told_of('stairs-what-one-foot-felt-all-know', higher).startswith('five of 20 cm up ')
+    assert ', a drive at 30 %, ' in told_of('what-the-controllers-do-not-know', weaker)
+    assert ' walks of 30 s under ' in told_of('any-command', shorter)
+    assert told_of('rate', faster).startswith('ten processes at 500 Hz on ')
 
 
 @pytest.mark.parametrize('study', ROWS)

@@ -20,12 +20,10 @@ import headlines_of_bodies as bodies
 import headlines_of_faults as faults
 from checkout import ROOT
 
+from dmp_cpg_ros.studies.random_stops import ROUGHNESS
 from dmp_cpg_ros.studies.walking_trials import relative_error
 
 README = ROOT / 'README.md'
-
-FOLDER = ROOT / 'doc' / 'results'
-"""Where the files are, named as the sections: ``COMMAND --json doc/results/SECTION.json``."""
 
 STOPS = ROOT / 'doc' / 'stops.md'
 """The tables that ``study_stops`` prints, of :func:`stops` and of :func:`brisk_stops`."""
@@ -127,8 +125,10 @@ def body_stops(of: Any) -> str:
     below = f', in another one below {100.0 * of["below"]["1e-06"]:.2g} % at confidence ' \
         '1 − 10⁻⁶' if of['below'] else ''
     later = ' later or farther on' if told.endswith('stood') else ''
-    return (f'{of["stops"]:,} random stops on the flat, slopes of 6° and hills of 5°, with '
-            f'friction of 0.3 to 1, payloads and pushes: {of["fell"] or "none"} fell, '
+    slopes, hills = (f'{max(ROUGHNESS[ground]):g}°' for ground in ('slope', 'hills'))
+    assert set(of['grounds']) == set(ROUGHNESS), of['grounds']
+    return (f'{of["stops"]:,} random stops on the flat, slopes of {slopes} and hills of {hills}, '
+            f'with friction of 0.3 to 1, payloads and pushes: {of["fell"] or "none"} fell, '
             f'{of["stepped"]} were stepped out of, {told}{later} than was said{below}')
 
 
@@ -171,9 +171,10 @@ def any_command(results: Any) -> str:
     """Of ``random_commands``."""
     count, _, fell, stops, late, stepped, _ = commanded(results)
     kept = 'as predicted and within their bounds' if not late else f'of which {late} were late'
-    return (f'{count} walks of 60 s under random commands, gaits and stops on seeds nothing was '
-            f'tuned on: {fell or "none"} fell, {stops:,} stops {kept}, {stepped} more stepped '
-            'out of')
+    seconds = max(one['seconds'] for one in results)  # those that fell are shorter
+    return (f'{count} walks of {seconds:.0f} s under random commands, gaits and stops on seeds '
+            f'nothing was tuned on: {fell or "none"} fell, {stops:,} stops {kept}, {stepped} more '
+            'stepped out of')
 
 
 def commanded(results: Any) -> tuple[int, ...]:
@@ -194,8 +195,17 @@ def rough(results: Any) -> str:
     shares = [share for of in crossings(results).values() for share in of]
     seeds = {one['case']['seed'] for one in results['rough']}
     span = f'{min(shares):.0f} to {max(shares):.0f} %'.replace('100 to 100', '100')
-    return (f'blind, {len(seeds)} seeds each: {span} cross blocks of 5 cm, slopes of 15°, steps '
-            'of 8 cm, and friction 0.3')
+    blocks, slope, steps, friction = (size_of(results['rough'], kind, name) for kind, name in (
+        ('blocks', 'height'), ('slope', 'degrees'), ('steps', 'height'),
+        ('low_friction', 'friction')))
+    return (f'blind, {len(seeds)} seeds each: {span} cross blocks of {100.0 * blocks:g} cm, '
+            f'slopes of {slope:g}°, steps of {100.0 * steps:g} cm, and friction {friction:g}')
+
+
+def size_of(of: Any, kind: str, name: str) -> float:
+    """The size that a number of all grounds of a kind has."""
+    (size,) = {abs(one['case']['numbers'][name]) for one in of if one['case']['kind'] == kind}
+    return float(size)
 
 
 def stairs(results: Any) -> str:
@@ -204,8 +214,10 @@ def stairs(results: Any) -> str:
     (off, off_fell, _), (on, on_fell, _) = (
         map(sum, zip(*(counts[word, gait] for gait in ('amble', 'trot')), strict=True))
         for word in ('off', 'on'))
-    return (f'five of 10 cm up and down, blind: {on} of {of} walks cross, {on_fell} fall; without '
-            f'what all legs share {off or "none"} and {off_fell}')
+    high, number = (size_of(results['climbing'], 'steps', name) for name in ('height', 'count'))
+    return (f'{bodies.NUMBERS[int(number)]} of {100.0 * high:g} cm up and down, blind: {on} of '
+            f'{of} walks cross, {on_fell} fall; without what all legs share {off or "none"} and '
+            f'{off_fell}')
 
 
 def climbed(results: Any) -> dict[tuple[str, str], list[int]]:
@@ -264,9 +276,15 @@ def rate(runs: Any) -> str:
     each, composed, slow = (real_time_factor(runs[way])
                             for way in ('each', 'composed', 'each_100_hz'))
     assert slow > 0.999, slow
-    return (f'ten processes at 250 Hz on two cores: real-time factor {benchmarked("idle"):.2f}; '
-            f'on [slower cores](doc/performance.md) in slow motion ({each:.2f}, with `--composed` '
-            f'{composed:.2f}), at 100 Hz in real time')
+    usual, lower = (control_rate(runs[way]) for way in ('each', 'each_100_hz'))
+    return (f'ten processes at {usual} Hz on two cores: real-time factor '
+            f'{benchmarked("idle"):.2f}; on [slower cores](doc/performance.md) in slow motion '
+            f'({each:.2f}, with `--composed` {composed:.2f}), at {lower} Hz in real time')
+
+
+def control_rate(metrics: Any) -> int:
+    """Ticks in a second of the robot's clock [Hz]."""
+    return round(metrics['timing']['rate_hz'] / metrics['timing']['real_time_factor'])
 
 
 def real_time_factor(metrics: Any) -> float:
@@ -359,9 +377,9 @@ def stair_rows(results: Any) -> list[str]:
 
 def rate_rows(runs: Any) -> list[str]:
     """Rows of the table of rates on slow cores, and what the section says of the benchmark."""
-    ways = {'each': 'ten processes | 250', 'blocks': 'blocks | 250',
-            'composed': 'one process and the recorder | 250', 'each_100_hz': 'ten processes | 100'}
-    rows = [f'| {way} Hz | {real_time_factor(runs[name]):.2f} | '
+    ways = {'each': 'ten processes', 'blocks': 'blocks',
+            'composed': 'one process and the recorder', 'each_100_hz': 'ten processes'}
+    rows = [f'| {way} | {control_rate(runs[name])} Hz | {real_time_factor(runs[name]):.2f} | '
             f'{runs[name]["timing"]["latency_ms_p50"]:.1f} / '
             f'{runs[name]["timing"]["latency_ms_p99"]:.1f} ms | '
             f'{100.0 * runs[name]["tracking"]["v_error_max"]:.1f} % |'
@@ -467,10 +485,10 @@ def content(anchor: str) -> Any:
         return dict(zip(TABLES_OF_STOPS, tables(STOPS.read_text(encoding='utf-8')), strict=True))[
             anchor]
     name = STUDIES[anchor].file or anchor
-    if (FOLDER / name).is_dir():
+    if (bodies.FOLDER / name).is_dir():
         return {file.stem: json.loads(file.read_text(encoding='utf-8'))
-                for file in (FOLDER / name).glob('*.json')}
-    return json.loads((FOLDER / f'{name}.json').read_text(encoding='utf-8'))
+                for file in (bodies.FOLDER / name).glob('*.json')}
+    return json.loads((bodies.FOLDER / f'{name}.json').read_text(encoding='utf-8'))
 
 
 def headlines() -> dict[str, str]:

@@ -9,11 +9,14 @@ the file that its command has written.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from itertools import product
 from math import nan, pi
 from statistics import median
 from typing import Any
+
+from checkout import ROOT
 
 from dmp_cpg_ros.studies.benchmark_cases import MISMATCHED, MISMATCHED_WALKS
 from dmp_cpg_ros.studies.benchmark_walking import steady_cells
@@ -21,8 +24,8 @@ from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary
 from dmp_cpg_ros.studies.trial_tables import least_and_median
 from dmp_cpg_ros.studies.walking_trials import SteadyOutcome, relative_error
 
-MASS = 8.91
-"""Of the package's own robot [kg]."""
+FOLDER = ROOT / 'doc' / 'results'
+"""Where the files are, named as the sections: ``COMMAND --json doc/results/SECTION.json``."""
 
 Pushes = dict[str, list[list[float]]]
 """Speed changes that were survived (phases, directions), by who was pushed [m/s]."""
@@ -66,13 +69,15 @@ def at_rest(results: Any) -> dict[float, dict[bool, list[bool]]]:
 def pushes(results: Any) -> str:
     """Of ``benchmark_walking --tables pushes manoeuvres``."""
     walks, resting = survived(results['pushes'], 'gait', 'speed'), at_rest(results)
+    of = json.loads((FOLDER / 'other-robots.json').read_text(encoding='utf-8'))
+    mass = other_robots(of)[ROBOTS['mini_quadruped']]['mass']
     amble, (low, high) = least(walks['amble 0.5']), (min(resting), max(resting))
 
     def falls(change: float, steps: bool) -> str:
         return f'{sum(resting[change][steps])} of {len(resting[change][steps])}'
 
     return (f'at every phase, from everywhere, amble 0.5 m/s: {amble:.1f} m/s '
-            f'({amble * MASS:.1f} N s), trot: {least(walks["trot 0.5"]):.1f} m/s; at rest '
+            f'({amble * mass:.1f} N s), trot: {least(walks["trot 0.5"]):.1f} m/s; at rest '
             f'{low:g} m/s from {len(resting[low][True])} directions: {falls(low, True)} falls '
             f'(without steps {falls(low, False)}), {high:g} m/s: {falls(high, True)} '
             f'({falls(high, False)})')
@@ -125,9 +130,27 @@ def mismatch(results: Any) -> str:
     walks = sum(each for *_, each in of)
     fell = walks - sum(len(errors) for _, _, errors, _ in of)
     worst = max(max(errors) for _, _, errors, _ in of)
-    return ("payload of the robot's mass, a drive at 40 %, ten times the friction or the sensors' "
-            f'noise, mass 3 cm aside: {walks} walks, {fell or "no"} fall, speed within '
-            f'{worst:.1f} %')
+    payload, weak, friction, noise, aside = map(unknown(results).__getitem__, (
+        'payload', 'joint_strength', 'joint_friction', 'sensor_noise', 'mass_offset'))
+    load = "the robot's mass" if payload == 1.0 else f"{payload:g} of the robot's mass"
+    assert friction == noise, (friction, noise)
+    return (f'payload of {load}, a drive at {100.0 * weak:.0f} %, {NUMBERS[int(friction)]} times '
+            f"the friction or the sensors' noise, mass {100.0 * aside:g} cm aside: {walks} walks, "
+            f'{fell or "no"} fall, speed within {worst:.1f} %')
+
+
+def unknown(results: Any) -> dict[str, float]:
+    """What the controllers do not know, by its name: the size of the one value that is none of
+    a robot as they know it.
+    """
+    of: dict[str, set[float]] = {}
+    for one in results['mismatch']:
+        for name, value in one['case']['values']:
+            listed = value if isinstance(value, list) else [value]
+            usual = 0.0 if name == 'mass_offset' else 1.0 if name == 'joint_strength' else None
+            of.setdefault(name, set()).update(abs(part) for part in listed if part != usual)
+    assert all(len(sizes) == 1 for sizes in of.values()), of
+    return {name: size for name, (size,) in of.items()}
 
 
 def mismatch_rows(results: Any) -> list[str]:
