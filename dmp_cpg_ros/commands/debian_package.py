@@ -34,6 +34,18 @@ FROM_INDEX = {'python3-mujoco-pip': ('mujoco',), 'python3-rosbags-pip': ('rosbag
 OF_DEBIAN = ('python3-lz4', 'python3-zstandard')
 """What the last of them brings, and Debian has too."""
 
+COPYRIGHT = """\
+Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/
+Upstream-Name: {name}
+Upstream-Contact: {contact}
+
+Files: *
+Copyright: {notice}
+License: {licence}
+ On Debian systems the full text of this licence is in /usr/share/common-licenses/{licence}.
+"""
+"""What Debian wants to be told of every package's licence."""
+
 SCRIPT = """\
 #!/usr/bin/{python}
 import sys
@@ -42,10 +54,16 @@ sys.exit({function}())
 """
 
 
+def python_versions() -> list[str]:
+    """Debian's Python, of the one version whose folder the package is in."""
+    major, minor = PYTHON.removeprefix('python').split('.')
+    return [f'python3 (>= {major}.{minor})', f'python3 (<< {major}.{int(minor) + 1})']
+
+
 def dependencies(manifest: ElementTree.Element) -> list[str]:
     """Debian packages of the ``exec_depend`` of a package.xml, less those that are none."""
     keys = [entry.text or '' for entry in manifest.findall('exec_depend')]
-    return sorted([*OF_DEBIAN, *(key if key.startswith('python3-') else
+    return sorted([*OF_DEBIAN, *python_versions(), *(key if key.startswith('python3-') else
                                  f'ros-{DISTRIBUTION}-{key.replace("_", "-")}'
                                  for key in keys if key not in FROM_INDEX)])
 
@@ -55,8 +73,6 @@ def control(manifest: ElementTree.Element) -> str:
     def text(tag: str) -> str:
         return ' '.join((manifest.findtext(tag) or '').split())
 
-    person, url = manifest.find('maintainer'), manifest.findtext('url')
-    assert person is not None
     names = [name for found in FROM_INDEX.values() for name in found]
     summary, _, rest = text('description').partition(':')
     rest = rest.strip()
@@ -66,9 +82,33 @@ def control(manifest: ElementTree.Element) -> str:
     return '\n'.join([
         f'Package: ros-{DISTRIBUTION}-{text("name").replace("_", "-")}',
         f'Version: {text("version")}-1', 'Section: misc', 'Priority: optional',
-        'Architecture: all', f'Maintainer: {person.text} <{person.get("email")}>',
-        f'Homepage: {url}', f'Depends: {", ".join(dependencies(manifest))}',
+        'Architecture: all', f'Maintainer: {maintainer(manifest)}',
+        *(f'Homepage: {url}' for url in homepage(manifest)),
+        f'Depends: {", ".join(dependencies(manifest))}',
         f'Description: {summary}', *(f' {line}' for line in told), ''])
+
+
+def maintainer(manifest: ElementTree.Element) -> str:
+    """Name and address of who maintains the package."""
+    person = manifest.find('maintainer')
+    assert person is not None
+    return f'{person.text} <{person.get("email")}>'
+
+
+def homepage(manifest: ElementTree.Element) -> list[str]:
+    """The website of a package.xml, else its repository, if it names one; without a type an url
+    is a website.
+    """
+    urls = {url.get('type', 'website'): (url.text or '').strip() for url in manifest.iter('url')}
+    return [urls[kind] for kind in ('website', 'repository') if kind in urls][:1]
+
+
+def copyright_of(manifest: ElementTree.Element, source: str) -> str:
+    """What Debian is told of the licence, from package.xml and the notice of a source file."""
+    notice = source.partition('\n')[0].removeprefix('# Copyright ')
+    return COPYRIGHT.format(
+        name=manifest.findtext('name'), contact=maintainer(manifest), notice=notice,
+        licence=manifest.findtext('license'))
 
 
 def lay_out(wheel: Path, root: Path) -> ElementTree.Element:
@@ -116,10 +156,15 @@ def debian_package(wheel: Path, folder: Path) -> Path:
     with TemporaryDirectory() as temporary:
         root = Path(temporary)
         root.chmod(0o755)
-        text = control(lay_out(wheel, root))
-        (root / 'DEBIAN').mkdir()
-        (root / 'DEBIAN' / 'control').write_text(text, encoding='utf-8')
+        manifest = lay_out(wheel, root)
+        text = control(manifest)
         fields = dict(line.split(': ', 1) for line in text.splitlines() if line[0] != ' ')
+        source = f'lib/{PYTHON}/site-packages/{manifest.findtext("name")}/__init__.py'
+        notice = copyright_of(manifest, (root / PREFIX / source).read_text(encoding='utf-8'))
+        for place, content in (('DEBIAN/control', text),
+                               (f'usr/share/doc/{fields["Package"]}/copyright', notice)):
+            (root / place).parent.mkdir(parents=True, exist_ok=True)
+            (root / place).write_text(content, encoding='utf-8')
         deb = folder / f'{fields["Package"]}_{fields["Version"]}_all.deb'
         try:
             subprocess.run(['dpkg-deb', '--build', '--root-owner-group', str(root), str(deb)],

@@ -22,7 +22,7 @@ from checkout import PACKAGE, ROOT, imports, modules, setup_argument, setup_cons
 
 import dmp_cpg_ros
 from dmp_cpg_ros.__main__ import ON_THE_INDEX
-from dmp_cpg_ros.commands.debian_package import debian_package
+from dmp_cpg_ros.commands.debian_package import control, debian_package
 from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.suite_table import KINDS
 
@@ -248,14 +248,36 @@ def test_a_debian_package_has_the_files_of_the_wheel_and_asks_for_what_debian_ha
         assert os.access(script, os.X_OK) and f'import {name}' in script.read_text('utf-8')
     said = {field: subprocess.run(
         ['dpkg-deb', '--field', str(deb), field], capture_output=True, text=True,
-        check=True).stdout for field in ('Depends', 'Description')}
+        check=True).stdout for field in ('Package', 'Depends', 'Description')}
     depends = said['Depends'].strip().split(', ')
     assert {'ros-jazzy-rclpy', 'ros-jazzy-sensor-msgs', 'ros-jazzy-launch-ros', 'python3-yaml',
             'python3-lz4', 'python3-zstandard'} <= set(depends)
+    assert {'python3 (>= 3.12)', 'python3 (<< 3.13)'} <= set(depends)
     assert not [name for name in depends if name.endswith('-pip') or 'mcap' in name]
     for name in ('mujoco', 'rosbags', 'mcap'):
         assert name in said['Description']
     assert 'lz4' not in said['Description']
+    told = (tmp_path / 'root' / 'usr' / 'share' / 'doc' / said['Package'].strip()
+            / 'copyright').read_text(encoding='utf-8')
+    assert f'\nUpstream-Name: {PACKAGE}\n' in told and '/common-licenses/Apache-2.0' in told
+    assert '\nCopyright: 2026 The dmp_cpg_ros authors\nLicense: Apache-2.0\n' in told
+
+
+def test_a_debian_package_is_at_home_at_the_website_else_at_the_repository() -> None:
+    def at_home(*urls: str) -> str:
+        root = manifest()
+        for url in root.findall('url'):
+            root.remove(url)
+        root.extend(map(ElementTree.fromstring, urls))
+        return '; '.join(line for line in control(root).splitlines() if 'https:' in line)
+
+    repository = '<url type="repository">https://a.example</url>'
+    assert at_home('<url type="bugtracker">https://b.example</url>', repository,
+                   '<url type="website">https://c.example</url>') == 'Homepage: https://c.example'
+    assert at_home(repository, '<url>https://d.example</url>') == 'Homepage: https://d.example'
+    assert at_home('<url type="bugtracker">https://b.example</url>', repository
+                   ) == 'Homepage: https://a.example'
+    assert at_home('<url type="bugtracker">https://b.example</url>') == ''
 
 
 @installed
