@@ -39,8 +39,11 @@ ON_THE_INDEX = {
 distribution has no package of one, the suite is installed without it.
 """
 
-WITHOUT_REQUIREMENT = ("{} needs the Python package '{}', which this Python ({}) does not find: "
-                       'pip install {}')
+WITHOUT_REQUIREMENT = ('{} needs from the Python package index what this Python ({}) does not '
+                       'find: {} {}')
+
+INSTALL, INSTALL_BESIDE = 'pip install', 'pip install --user --break-system-packages'
+"""How to install it: where the packages are a distribution's, pip refuses the usual way."""
 
 WITHOUT_ROS = ("{} needs ROS 2 Jazzy, which this Python ({}) does not find: source it, or "
                "pip install 'dmp_cpg_ros[ros]' (x86-64, Python 3.10 to 3.13)")
@@ -88,13 +91,25 @@ def run(name: str) -> int:
         return INTERRUPTED
     except ModuleNotFoundError as error:
         missing = str(error.name).partition('.')[0]
-        wanted = ON_THE_INDEX.get(missing, '')
-        if not wanted and (missing == PACKAGE or find_spec('rclpy') is not None):
+        if missing not in ON_THE_INDEX and (
+                missing == PACKAGE or find_spec('rclpy') is not None):
             raise
-        text = WITHOUT_REQUIREMENT.format(name, wanted, sys.executable, wanted) if wanted else (
-            WITHOUT_ROS.format(name, sys.executable))
+        wanted = [index for module, index in ON_THE_INDEX.items() if find_spec(module) is None]
+        text = WITHOUT_ROS.format(name, sys.executable) if missing not in ON_THE_INDEX else (
+            WITHOUT_REQUIREMENT.format(name, sys.executable, INSTALL_BESIDE if _of_distribution()
+                                       else INSTALL, ' '.join(wanted)))
         print(f'dmp_cpg_ros: {text}', file=sys.stderr)
         return BAD_INPUT
+
+
+def _of_distribution() -> bool:
+    """Whether a distribution manages the packages of this Python (PEP 668), as where the suite
+    lies below ``/opt/ros``.
+    """
+    import sysconfig
+
+    return sys.prefix == sys.base_prefix and os.path.isfile(
+        os.path.join(sysconfig.get_path('stdlib'), 'EXTERNALLY-MANAGED'))
 
 
 @contextmanager

@@ -225,6 +225,22 @@ def test_a_requirement_that_is_missing_is_named_in_one_line(
     assert f'pip install {ON_THE_INDEX[missing]}\n' in process.stderr
 
 
+@pytest.mark.parametrize(('managed', 'told'), [
+    (True, 'pip install --user --break-system-packages mujoco rosbags mcap\n'),
+    (False, ': pip install mujoco rosbags mcap\n')])
+def test_all_that_is_missing_is_named_at_once_with_a_way_that_pip_takes_there(
+        managed: bool, told: str, tmp_path: Path) -> None:
+    (tmp_path / 'EXTERNALLY-MANAGED').touch()
+    code = (f'import sys, sysconfig; sys.modules.update(mujoco=None, rosbags=None, mcap=None); '
+            f'sys.base_prefix = sys.prefix if {managed} else "/usr"; '
+            f'sysconfig.get_path = lambda name: {str(tmp_path)!r}; '
+            "from dmp_cpg_ros.__main__ import main; sys.exit(main(['mujoco_robot']))")
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
+                          check=False, timeout=120)
+    assert (done.returncode, done.stderr.count('\n')) == (2, 1), done.stderr
+    assert done.stderr.endswith(told)
+
+
 def test_every_requirement_can_be_named() -> None:
     assert ON_THE_INDEX == {module: name for name, (_, module) in DEPENDENCIES.items()}
 
