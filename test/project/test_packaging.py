@@ -119,6 +119,20 @@ def test_names_versions_and_licence_agree() -> None:
                      re.MULTILINE)
 
 
+def test_who_is_cited_and_where_it_lives_is_as_in_package_xml() -> None:
+    citation = load_yaml(ROOT / 'CITATION.cff')
+    urls = {url.get('type', 'website'): url.text for url in manifest().findall('url')}
+    assert {key: citation[key] for key in ('url', 'repository-code') if key in citation} == {
+        key: urls[kind] for key, kind in (('url', 'website'), ('repository-code', 'repository'))
+        if kind in urls}
+    assert [author['name'] for author in citation['authors']] == texts('author')
+    (paper,) = citation['references']
+    assert {'title', 'journal', 'volume', 'start', 'end', 'year', 'authors'} <= set(paper)
+    readme = (ROOT / 'README.md').read_text(encoding='utf-8')
+    names = ' & '.join(author['family-names'] for author in paper['authors'])
+    assert f'{names}, *{paper["title"]}*, {paper["year"]}' in ' '.join(readme.split())
+
+
 def test_every_requirement_has_its_rosdep_key_and_a_tested_version() -> None:
     required = {name_of(text) for text in setup_argument('install_requires')}
     extras = setup_argument('extras_require')
