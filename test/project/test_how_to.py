@@ -11,6 +11,7 @@ from checkout import ROOT
 
 from dmp_cpg_ros.configuration import parse_yaml
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
+from dmp_cpg_ros.suite_table import KINDS
 
 CONTROLLERS = {
     'joint_state_broadcaster/JointStateBroadcaster': {
@@ -54,6 +55,20 @@ def test_the_controllers_of_the_hardware_page_are_those_that_the_driver_speaks_w
     assert set(content) == {
         'joint_state_broadcaster', 'imu_sensor_broadcaster', *forwarded, *feet}
     assert content['joint_state_broadcaster']['ros__parameters'] == {'use_local_topics': True}
+
+
+def test_the_nodes_that_expect_one_another_beside_a_driver_are_those_that_are_started() -> None:
+    pytest.importorskip('rclpy')
+    from dmp_cpg_ros.commands.reference import tables_of_parameters
+    from dmp_cpg_ros.nodes.framework.parameters import NodeParameters
+
+    given = parse_yaml(example('hardware.md', '/**'), 'hardware.md')['/**']['ros__parameters']
+    expected = NodeParameters(expected_nodes=tuple(given['expected_nodes'])).expected_nodes
+    text = (ROOT / 'doc' / 'how_to' / 'hardware.md').read_text(encoding='utf-8')
+    (started,) = re.findall(r'composed_suite (.*?) --ros-args', text)
+    assert [name for kind in expected for name in KINDS[kind].instances] == started.split()
+    assert given.keys() <= {
+        name for table in tables_of_parameters().values() for name in table.fields}
 
 
 @pytest.mark.parametrize(('gait', 'column'), [('amble', 3), ('walk', 4), ('trot', 5)])
