@@ -23,7 +23,7 @@ def attacks(results: Any) -> list[intruder.Outcome]:
 
 def hostile(results: Any) -> str:
     """Of ``intruder``: how long, how much, and what came of it."""
-    of = [one for one in attacks(results) if one.attack != intruder.NOTHING]
+    of = real(attacks(results))
     fell, slow = sum(one.fell for one in of), astray(of)
     on = 'it walks on as before after each' if not slow else (
         f'it walks on as before after all but {NUMBERS[slow]}')
@@ -31,6 +31,11 @@ def hostile(results: Any) -> str:
     return (f'{results["duration_s"] / 60.0:g} minutes among {results["messages"]:,} hostile '
             f'messages and requests, {len(of)} attacks: {fell or "no"} fall, {on}, and who sends '
             f'them is named within {median(named):.1f} s (median), {named[-1]:.1f} s at worst')
+
+
+def real(of: Sequence[intruder.Outcome]) -> list[intruder.Outcome]:
+    """Attacks but those that do nothing, which are there to compare with."""
+    return [one for one in of if one.attack != intruder.NOTHING]
 
 
 def astray(of: Sequence[intruder.Outcome]) -> int:
@@ -51,7 +56,9 @@ def kills(results: Any) -> str:
 def hostile_rows(results: Any) -> list[str]:
     """Row of the table of runs with an intruder."""
     of = attacks(results)
-    return [f'(`--duration {results["duration_s"]:g} --seed {results["seed"]}`) | {len(of)} | '
+    idle = len(of) - len(real(of))
+    return [f'(`--duration {results["duration_s"]:g} --seed {results["seed"]}`) | {len(of)}, '
+            f'{idle} of them nothing | '
             f'{sum(one.fell for one in of)} | {astray(of)} |']
 
 
