@@ -8,6 +8,7 @@ import gc
 import os
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,16 @@ def pytest_collection_finish() -> None:
     """Spare what has been imported from the garbage collector."""
     gc.collect()
     gc.freeze()
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Say why tests were skipped: a line for every reason, where ``-rs`` has one for every place.
+    """
+    skipped = terminalreporter.stats.get('skipped', [])
+    if skipped:
+        terminalreporter.section('skipped')
+    for reason, count in Counter(report.longrepr[2] for report in skipped).most_common():
+        terminalreporter.line(f'{count} x {reason.removeprefix("Skipped: ")}')
 
 
 _crashed: set[str] = set()
