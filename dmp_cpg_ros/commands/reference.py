@@ -125,15 +125,33 @@ def events() -> str:
         (f'`{kind}`', meaning(read)) for kind, read in EVENT_KINDS.items()))
 
 
+WITHOUT_COMMENT = {
+    'foxglove/dmp_cpg_ros.json': 'Layout for Foxglove: the robot, plots of oscillators, gains, '
+                                 'feet and speed, diagnostics, and buttons to drive and stop.',
+    'maps/free_field.pbm': 'The picture of free_field.yaml.',
+    'plotjuggler/dmp_cpg_ros.xml': 'Layout for PlotJuggler: tabs of gait, body and joints.',
+    'rviz/dmp_cpg_ros.rviz': 'Displays for RViz: the robot, its feet, its path and its frames.'}
+"""What files of ``config/`` are that do not say so themselves."""
+
+
+def first_sentence(text: str) -> str:
+    """First sentence of the comment with which a file begins, which may go over several lines;
+    empty where there is none. An example of a command below it, which is indented, is not read.
+    """
+    found = (re.match(r'(?:<\?xml[^>]*>\s*)?<!--(.*?)-->', text, re.DOTALL)
+             or re.match(r'((?:# ?\S.*\n)+)', text))
+    lines = found[1].splitlines() if found else []
+    comment = ' '.join(line.removeprefix('#').strip() for line in lines).strip()
+    return re.split(r'(?<=\.)\s', comment)[0].rstrip(':.') + '.' if comment else ''
+
+
 def files() -> str:
-    """Files of ``config/``, with the line with which each of them begins."""
+    """Files of ``config/``, with the sentence with which each of them begins."""
     folder, *_ = config_folders()
-    rows = []
-    for path in sorted(folder.rglob('*.*')):
-        first = path.read_text(encoding='utf-8').splitlines()[0]
-        rows.append((f'`{path.relative_to(folder).as_posix()}`',
-                     first.removeprefix('# ') if first.startswith('#') else ''))
-    return _table(('file', 'begins'), rows)
+    names = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob('*.*'))]
+    return _table(('file', 'what it is'), (
+        (f'`{name}`', WITHOUT_COMMENT.get(name) or first_sentence(
+            (folder / name).read_text(encoding='utf-8'))) for name in names))
 
 
 def metrics() -> str:

@@ -112,7 +112,8 @@ def policies() -> dict[str, Rules]:
 def policy_xml() -> str:
     """The policy as ``ros2 security create_permission`` reads it."""
     lines = ['<?xml version="1.0" encoding="UTF-8"?>',
-             '<!-- Written by python -m dmp_cpg_ros.commands.security_policy; do not edit. -->',
+             '<!-- Rights of all nodes for SROS 2, written by '
+             'python -m dmp_cpg_ros.commands.security_policy; do not edit. -->',
              '<policy version="0.2.0">', '  <enclaves>']
     for node, rules in sorted(policies().items()):
         lines += [f'    <enclave path={quoteattr(f"{ENCLAVE}/{node}")}>', '      <profiles>',

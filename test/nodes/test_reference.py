@@ -115,6 +115,26 @@ def test_every_kind_of_event_is_in_the_reference_and_has_its_example() -> None:
         EVENT_KINDS)
 
 
+def test_every_file_is_told_of_in_a_whole_sentence_of_its_own() -> None:
+    rows = dict(re.findall(r'^\| `([^`]+)` \| (.*) \|$', reference.files(), re.MULTILINE))
+    config = ROOT / 'config'
+    assert rows.keys() == {str(path.relative_to(config)) for path in config.rglob('*')
+                           if path.is_file()}
+    for name, sentence in rows.items():
+        assert re.fullmatch(r'[A-Z].{8,}[^.:,]\.', sentence), (name, sentence)
+    assert rows['gaits.yaml'] == 'Gaits as data.'
+    assert len(set(rows.values())) == len(rows)
+    assert rows.keys() >= reference.WITHOUT_COMMENT.keys()
+
+
+def test_a_sentence_may_go_over_lines_of_a_comment_and_a_command_below_is_not_read() -> None:
+    for text in ('# What it is\n# in all.yaml. And more.\na: 1\n',
+                 '# What it is in all.yaml:\n#   ros2 run it\na: 1\n',
+                 '<?xml version="1.0"?>\n<!--\n  What it is in\n  all.yaml. More.\n-->\n<a/>\n'):
+        assert reference.first_sentence(text) == 'What it is in all.yaml.', text
+    assert reference.first_sentence('{"a": 1}') == ''
+
+
 def test_the_page_has_every_section_once() -> None:
     page = (ROOT / 'doc' / 'reference.md').read_text(encoding='utf-8')
     assert sorted(re.findall(r'<!-- table: (\w+) -->', page)) == sorted(reference.SECTIONS)
