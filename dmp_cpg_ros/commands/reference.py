@@ -12,7 +12,7 @@ import inspect
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -21,6 +21,8 @@ from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.commands.security_policy import LIFECYCLE_SERVICES, PARAMETER_SERVICES
 from dmp_cpg_ros.configuration import config_folders
 from dmp_cpg_ros.core.modes.requests import REQUESTS
+from dmp_cpg_ros.core.parameters import Key
+from dmp_cpg_ros.core.scenario import fault, scenario
 from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS
 from dmp_cpg_ros.core.suite_parameters import OWNER
 from dmp_cpg_ros.nodes.framework.parameters import (
@@ -111,6 +113,11 @@ def parameters() -> str:
         for title, group in groups.items() if group)
 
 
+def scenarios() -> str:
+    """Entries of a scenario, and of each of its events beside what happens."""
+    return _keys(scenario.KEYS) + '\nOf every event:\n\n' + _keys(scenario.EVENT_KEYS)
+
+
 def events() -> str:
     """Kinds of events of a scenario."""
     def meaning(read: Callable[..., Any]) -> str:
@@ -123,6 +130,17 @@ def events() -> str:
     assert set(REQUESTS) <= set(EVENT_KINDS)
     return _table(('event', 'value'), (
         (f'`{kind}`', meaning(read)) for kind, read in EVENT_KINDS.items()))
+
+
+def failures() -> str:
+    """Entries of the event ``fail``, what may fail, and how."""
+    return '\n'.join((
+        _keys(fault.KEYS),
+        _table(('component', 'what it is', 'of a leg'), (
+            (f'`{name}`', text, 'perhaps' if name in fault.PLACED else '')
+            for name, text in fault.COMPONENTS.items())),
+        _table(('kind', 'what a component does'), (
+            (f'`{name}`', text) for name, text in fault.KINDS.items()))))
 
 
 WITHOUT_COMMENT = {
@@ -161,7 +179,8 @@ def metrics() -> str:
 
 
 SECTIONS: dict[str, Callable[[], str]] = {section.__name__: section for section in (
-    executables, nodes, topics, services, parameters, events, files, metrics)}
+    executables, nodes, topics, services, parameters, scenarios, events, failures, files,
+    metrics)}
 """Sections by their name."""
 
 
@@ -183,6 +202,13 @@ def _ends(entry: Interface) -> tuple[str, str]:
     return tuple('every node' if every <= set(kinds) else ', '.join(
         f'{kind}{" (sometimes)" if kind in entry.sometimes else ""}' for kind in kinds) or '–'
         for kinds in (entry.publishers, entry.subscribers))  # type: ignore[return-value]
+
+
+def _keys(keys: Mapping[str, Key]) -> str:
+    """Table of the entries of a file."""
+    return _table(('entry', 'value', 'unit', 'without it', 'meaning'), (
+        (f'`{name}`', key.value, key.unit, key.default or 'refused', key.meaning)
+        for name, key in keys.items()))
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -12,7 +12,7 @@ import dataclasses
 import math
 import sys
 from collections.abc import Collection, Mapping
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from dmp_cpg_ros.core.errors import ParameterError
 
@@ -71,6 +71,32 @@ class Parameters:
         """
         check_names(values, [field.name for field in dataclasses.fields(cls)], (), where)
         return cls(**values)
+
+
+class Key(NamedTuple):
+    """Entry of a file, in the table by which the file is read.
+
+    Attributes
+    ----------
+    value : str
+        What it holds, in words.
+    meaning : str
+        What it is, in one sentence.
+    unit : str
+        SI unit as text, empty for pure numbers and words.
+    default : str
+        What holds without it, in words; empty where it is needed.
+    """
+
+    value: str
+    meaning: str
+    unit: str = ''
+    default: str = ''
+
+
+def needed(keys: Mapping[str, Key]) -> tuple[str, ...]:
+    """Entries that have no default."""
+    return tuple(name for name, key in keys.items() if not key.default)
 
 
 def range_of(cls: type[Parameters], name: str) -> tuple[float, float]:

@@ -5,8 +5,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -18,7 +19,9 @@ from rcl_interfaces.srv import ListParameters
 from ros_processes import Processes, Ros, composed_suite
 
 from dmp_cpg_ros.commands import reference
-from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.scenario.fault import Fault
+from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS, Event, Scenario
 from dmp_cpg_ros.nodes.framework.parameters import FOREIGN_PREFIXES
 from dmp_cpg_ros.nodes.messages.interfaces import COMMAND_INTERFACES, SERVICES, TOPICS, Interface
 from dmp_cpg_ros.suite_table import DRIVER, KINDS, RECORDER, VISUALIZATION
@@ -113,6 +116,63 @@ def test_every_kind_of_event_is_in_the_reference_and_has_its_example() -> None:
     rows = [line for line in table.splitlines() if line.startswith('| `')]
     assert {word for row in rows for word in re.findall(r'`(\w+)`', row.split('|')[1])} == set(
         EVENT_KINDS)
+
+
+def refuses(read: Callable[[Any], Any], whole: dict[str, Any]) -> set[str]:
+    """Entries without which a reader refuses what it takes as a whole."""
+    read(whole)
+    without = set()
+    for name in whole:
+        try:
+            read({key: value for key, value in whole.items() if key != name})
+        except DmpCpgError:
+            without.add(name)
+    return without
+
+
+def entries(section: str) -> dict[str, bool]:
+    """Entries of the tables of a section, and whether they are needed."""
+    rows = re.findall(r'^\| `([^`]+)` \| (?:[^|\n]*\|){2} ([^|\n]*) \|',
+                      reference.SECTIONS[section](), re.MULTILINE)
+    return {name: default == 'refused' for name, default in rows}
+
+
+def test_the_entries_of_a_scenario_are_those_that_its_reader_takes() -> None:
+    event = {'at': 1.0, 'label': 'told', 'inhibit': True}
+    whole = {'name': 'it', 'duration': 2.0, 'events': [event], 'parameters': {},
+             'world': {'kind': 'flat'}}
+    told = entries('scenarios')
+    assert told.keys() == whole.keys() | event.keys() - {'inhibit'}
+    needed = refuses(Scenario.from_mapping, whole) | refuses(
+        lambda entry: Event.from_mapping(entry, 'event'), event) - {'inhibit'}
+    assert {name for name, is_needed in told.items() if is_needed} == needed
+    with pytest.raises(DmpCpgError):
+        Scenario.from_mapping({**whole, 'other': 1})
+
+
+def test_the_entries_components_and_kinds_of_a_failure_are_those_that_its_reader_takes() -> None:
+    whole = {'component': 'joint', 'kind': 'off', 'for_s': 1.0, 'leg': 'fl'}
+    told = entries('failures')
+    assert told.keys() == whole.keys()
+    assert {name for name, is_needed in told.items() if is_needed} == refuses(
+        Fault.from_mapping, whole)
+    components, kinds = (
+        refusal({**whole, name: 'none'}).partition('valid are ')[2].split(', ')
+        for name in ('component', 'kind'))
+    assert documented('failures') - told.keys() == {*components, *kinds}
+    for name in components:
+        row = re.search(rf'^\| `{name}` .*', reference.failures(), re.MULTILINE)
+        assert row is not None
+        assert ('perhaps' in row[0]) == (refusal({**whole, 'component': name}) == '')
+
+
+def refusal(failure: dict[str, Any]) -> str:
+    """Why a failure is refused; empty where it is not."""
+    try:
+        Fault.from_mapping(failure)
+    except DmpCpgError as error:
+        return str(error)
+    return ''
 
 
 def test_every_file_is_told_of_in_a_whole_sentence_of_its_own() -> None:

@@ -19,21 +19,29 @@ import numpy as np
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
-from dmp_cpg_ros.core.parameters import shown
+from dmp_cpg_ros.core.parameters import Key, needed, shown
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 
-KINDS = ('off', 'stuck', 'garbage', 'wrong', 'slow', 'delayed', 'intermittent')
-"""Says nothing; always the same; anything; off by ``WRONG``; every ``LATE_NS`` only; ``LATE_NS``
-late; says nothing every other time, by chance.
-"""
+WRONG_STAMP_NS, LATE_NS = 10_000_000_000, 100_000_000
+"""By which a wrong clock is ahead, and by which what is slow or delayed is late [ns]."""
+
+KINDS = {
+    'off': 'says nothing', 'stuck': 'says the same all the time', 'garbage': 'says anything',
+    'wrong': 'is off by a constant', 'slow': f'says something new every {1e-9 * LATE_NS:g} s only',
+    'delayed': f'is {1e-9 * LATE_NS:g} s late',
+    'intermittent': 'says nothing every other time, by chance'}
+"""Kinds of failures, and what a component does then."""
 
 READINGS = {'imu': ('gyro_in_base', 'acceleration_in_base'),
             'encoder': ('joint_position', 'joint_velocity'), 'contact': ('foot_force',)}
 READINGS['bus'] = tuple(name for names in READINGS.values() for name in names)
 """Components that are sensors, and what they measure; the bus carries all of it."""
 
-COMPONENTS = (*READINGS, 'clock', 'link', 'node', 'joint')
-"""Besides: the robot's stamps, the way of targets to the robot, who sends them, the drives."""
+COMPONENTS = {
+    'imu': 'turn rate and acceleration of the base', 'encoder': 'angles and speeds of the joints',
+    'contact': 'forces on the feet', 'bus': 'all sensors', 'clock': "the robot's stamps",
+    'link': 'the way of targets to the robot', 'node': 'who sends targets', 'joint': 'the drives'}
+"""What may fail: sensors, and what else."""
 
 WRONG: dict[str, Any] = {
     'gyro_in_base': np.array((0.3, 0.0, 0.0)), 'acceleration_in_base': np.array((2.0, 0.0, 0.0)),
@@ -47,14 +55,17 @@ WILD = {'gyro_in_base': 20.0, 'acceleration_in_base': 100.0, 'joint_position': 2
 WRONG_TARGET, WILD_TARGET = 0.15, 2.0
 """The same of targets [rad]."""
 
-WRONG_STAMP_NS, LATE_NS = 10_000_000_000, 100_000_000
-"""By which a wrong clock is ahead, and by which what is slow or delayed is late [ns]."""
-
-LONGEST_S = 600.0
-"""Longest failure [s]."""
+USUAL_S, LONGEST_S = 0.5, 600.0
+"""How long a failure lasts that does not say, and the longest [s]."""
 
 PLACED = ('encoder', 'contact', 'link', 'node', 'joint')
 """Components of which every leg has its own."""
+
+KEYS = {
+    'component': Key('word', 'what fails'), 'kind': Key('word', 'what it does then'),
+    'for_s': Key('number', f'how long, at most {LONGEST_S:g}', 's', f'{USUAL_S:g}'),
+    'leg': Key('word', f'whose, of {", ".join(LEGS)}; some components only', default='all legs')}
+"""Entries of a failure."""
 
 Message = tuple[str, int, JointTargets]
 """Leg, stamp [ns] and targets (3,) as they are sent to the robot."""
@@ -76,7 +87,7 @@ class Fault:
 
     component: str
     kind: str
-    for_s: float = 0.5
+    for_s: float = USUAL_S
     leg: str = ''
 
     @classmethod
@@ -88,9 +99,9 @@ class Fault:
         DataError
             If there is no such failure; the text says what is valid.
         """
-        valid = {'component': COMPONENTS, 'kind': KINDS, 'leg': LEGS}
-        if not isinstance(value, Mapping) or not set(value) <= {*valid, 'for_s'} or not {
-                'component', 'kind'} <= set(value):
+        valid = {'component': tuple(COMPONENTS), 'kind': tuple(KINDS), 'leg': LEGS}
+        if not isinstance(value, Mapping) or not (
+                set(needed(KEYS)) <= set(value) <= set(KEYS)):
             raise DataError(f'{where} must be a mapping with component, kind, for_s, leg, the '
                             f'last two as needed, not {shown(value)}')
         if value['kind'] is False:  # what YAML 1.1 makes of a bare off

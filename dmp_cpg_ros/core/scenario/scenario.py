@@ -18,9 +18,9 @@ from typing import Any, cast
 
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
-from dmp_cpg_ros.core.parameters import shown
+from dmp_cpg_ros.core.parameters import Key, shown
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.robot_model.world import world_overrides
+from dmp_cpg_ros.core.robot_model.world import PREFIX, WORLDS, world_overrides
 from dmp_cpg_ros.core.scenario.fault import Fault
 from dmp_cpg_ros.core.scenario.push import FRAMES, LARGEST_MEAN_FORCE, LONGEST_PUSH_S, Push
 from dmp_cpg_ros.core.suite_parameters import OWNER, SuiteParameters
@@ -36,6 +36,21 @@ LARGEST_IMPULSE = 1000.0
 
 COMMAND_PERIOD_NS = 100_000_000
 """Period at which a command is repeated [ns]."""
+
+KEYS = {
+    'name': Key('text', 'short name', default='scenario'),
+    'duration': Key('number', "length on the robot's clock, at most a day", 's'),
+    'events': Key('list', 'what happens, and when, in order of time; `[]` for nothing'),
+    'parameters': Key('mapping', 'parameters that every node that has them starts with',
+                      default='none'),
+    'world': Key('mapping', f'`kind` of ground ({", ".join(WORLDS)}) and its numbers: parameters '
+                 f'of the robot without their `{PREFIX}`', default='flat')}
+"""Entries of a scenario."""
+
+EVENT_KEYS = {
+    'at': Key('number', "time on the robot's clock, not before that of the event above", 's'),
+    'label': Key('text', 'what is told when it happens', default='what the event does')}
+"""Entries of an event beside one of :data:`EVENT_KINDS`."""
 
 LASTING_KINDS = ('command', 'votes')
 """Kinds of events that hold until the next of their kind, and are repeated."""
@@ -65,7 +80,8 @@ class Event:
     @classmethod
     def from_mapping(cls, entry: Any, where: str) -> Event:
         """Read one entry of a scenario's list; raises DataError that says what is valid."""
-        known(entry, ('at', *EVENT_KINDS, 'label'), where)
+        first, *others = EVENT_KEYS
+        known(entry, (first, *EVENT_KINDS, *others), where)
         kinds = [kind for kind in EVENT_KINDS if kind in entry]
         if 'at' not in entry or len(kinds) != 1:
             raise DataError(f"{where} needs 'at' and exactly one of {', '.join(EVENT_KINDS)}, not "
@@ -247,7 +263,7 @@ class Scenario:
             If a key is missing or unknown, or a value cannot be used; the text says which and what
             is valid.
         """
-        known(values, ('name', 'duration', 'events', 'parameters', 'world'), where)
+        known(values, tuple(KEYS), where)
         try:
             duration, entries = float(values['duration']), list(values['events'])
         except (KeyError, TypeError, ValueError) as error:
@@ -267,7 +283,7 @@ class Scenario:
                     f'{where}, event {place + 1}: at = {event.at:g} s must not be before the '
                     f'event above it, nor after the duration: {before:g} to {duration:g} s')
             before = event.at
-        return cls(str(values.get('name', 'scenario')), duration, events,
+        return cls(str(values.get('name', KEYS['name'].default)), duration, events,
                    {**world_overrides(values.get('world'), where), **parameters})
 
     def timeline(self, tick_ns: int) -> tuple[Action, ...]:
