@@ -15,13 +15,13 @@ import yaml
 from dmp_cpg_ros import configuration
 from dmp_cpg_ros.configuration import find_config, load_yaml, naming, writable
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
-from dmp_cpg_ros.core.parameters import check_names, shown
+from dmp_cpg_ros.core.parameters import Key, check_names, shown
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.primitive import GaussianBases, VonMisesBases
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
-from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
+from dmp_cpg_ros.core.primitives.spring_damper import FORMS, SpringDamper
 from dmp_cpg_ros.core.transformation.foot_path import Motion
-from dmp_cpg_ros.core.transformation.learned_motion import LearnedMotion
+from dmp_cpg_ros.core.transformation.learned_motion import MOTION_NAMES, LearnedMotion
 
 Primitive = DiscretePrimitive | RhythmicPrimitive
 
@@ -56,6 +56,38 @@ _KINDS = {
 }
 _WORDS = ('format', 'kind', 'names', 'form')
 _SHARED = ('stiffness', 'damping', 'basis_centres', 'basis_widths', 'weights')
+
+KEYS = {
+    'format': Key('number', f'{_FORMAT}'),
+    'kind': Key('word', ' or '.join(_KINDS)),
+    'names': Key('list', 'degrees of freedom, `[]` where they have no names; those of a motion '
+                 f'are {MOTION_NAMES[0]}, {MOTION_NAMES[1]}, ..., {MOTION_NAMES[-1]}'),
+    'form': Key('word', f'reading of τ: {" or ".join(FORMS)}'),
+    'stiffness': Key('list', 'k of each degree of freedom', '1/s^2'),
+    'damping': Key('list', 'b of each degree of freedom', '1/s'),
+    'basis_centres': Key('list', 'phases at which the bases are largest; rhythmic ones in rad'),
+    'basis_widths': Key('list', 'widths σ of the bases'),
+    'weights': Key('lists', 'a row for each basis: a number for each degree of freedom, of a '
+                   'rhythmic primitive two, which multiply x1 and x2'),
+    'phase_decay': Key('number', 'α_x of the phase', '1/s'),
+    'duration': Key('number', 'duration of the demonstration', 's'),
+    'goal_rate': Key('number', 'rate of the filter on the goal', '1/s'),
+    'start': Key('list', 'start of the demonstration'),
+    'goal': Key('list', 'goal of the demonstration'),
+    'start_velocity': Key('list', 'velocity at the start at τ = 1, per s'),
+    'omega': Key('number', 'ω of the cycle at τ = 1', 'rad/s'),
+    'rho': Key('number', 'attraction to the cycle ρ at radius 1', '1/s'),
+    'centre_rate': Key('number', 'rate of the filter on the centre', '1/s'),
+    'amplitude_rate': Key('number', 'rate of the filter on the amplitude', '1/s'),
+    'centre': Key('list', 'centre of the demonstration'),
+    'tau_rate': Key('number', 'rate of the filter on τ', '1/s')}
+"""Entries of a primitive: those of both kinds, and those of one."""
+
+
+def keys_of(kind: str) -> dict[str, Key]:
+    """Entries of a kind of primitive, ``discrete`` or ``rhythmic``; all of them are needed."""
+    of = _KINDS[kind]
+    return {name: KEYS[name] for name in (*_WORDS, *_SHARED, *of.scalars, *of.vectors)}
 
 
 def save_primitive(primitive: Primitive, path: str | Path) -> None:
@@ -119,11 +151,11 @@ def load_primitive(path: str | Path) -> Primitive:
         raise DataError(
             f'{path}: format {shown(content.get("format"))} is not known; valid is {_FORMAT}')
     with naming(path):
-        return _read(_KINDS[kind], content, path)
+        return _read(kind, content, path)
 
 
-def _read(of: _Kind, content: dict[str, Any], path: str | Path) -> Primitive:
-    keys = (*_WORDS, *_SHARED, *of.scalars, *of.vectors)
+def _read(kind: str, content: dict[str, Any], path: str | Path) -> Primitive:
+    of, keys = _KINDS[kind], tuple(keys_of(kind))
     check_names(content, keys, keys, str(path))
     names = content['names']
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):

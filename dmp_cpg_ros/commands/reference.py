@@ -17,9 +17,11 @@ from functools import partial
 from importlib import import_module
 from typing import Any
 
+from dmp_cpg_ros import primitive_files
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.commands.security_policy import LIFECYCLE_SERVICES, PARAMETER_SERVICES
 from dmp_cpg_ros.configuration import config_folders
+from dmp_cpg_ros.core.gait import gait
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.parameters import Key
 from dmp_cpg_ros.core.scenario import fault, scenario
@@ -40,6 +42,7 @@ from dmp_cpg_ros.nodes.messages.interfaces import (
     read_by,
     served_by,
 )
+from dmp_cpg_ros.robot import robot_file
 from dmp_cpg_ros.suite_table import KINDS, RECORDER
 
 SEVERAL = 'several nodes'
@@ -163,6 +166,26 @@ def first_sentence(text: str) -> str:
     return re.split(r'(?<=\.)\s', comment)[0].rstrip(':.') + '.' if comment else ''
 
 
+def robots() -> str:
+    """Entries of a robot's file."""
+    return _keys(robot_file.KEYS)
+
+
+def gaits() -> str:
+    """Entries of each gait, below its name, below ``gaits``."""
+    return _keys(gait.KEYS)
+
+
+def primitives() -> str:
+    """Entries of a primitive's file by its kind; a motion is a rhythmic one."""
+    of = {kind: primitive_files.keys_of(kind) for kind in ('discrete', 'rhythmic')}
+    shared = {name: key for name, key in of['discrete'].items() if name in of['rhythmic']}
+    return '\n'.join((_keys(shared), *(
+        f'Of a {kind} one besides:\n\n'
+        + _keys({name: key for name, key in keys.items() if name not in shared})
+        for kind, keys in of.items())))
+
+
 def files() -> str:
     """Files of ``config/``, with the sentence with which each of them begins."""
     folder, *_ = config_folders()
@@ -179,8 +202,8 @@ def metrics() -> str:
 
 
 SECTIONS: dict[str, Callable[[], str]] = {section.__name__: section for section in (
-    executables, nodes, topics, services, parameters, scenarios, events, failures, files,
-    metrics)}
+    executables, nodes, topics, services, parameters, scenarios, events, failures, robots, gaits,
+    primitives, files, metrics)}
 """Sections by their name."""
 
 

@@ -20,11 +20,15 @@ from dmp_cpg_ros.robot import model_parts
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_parts import ModelIds, foot_position
 from dmp_cpg_ros.robot.mujoco_import import mujoco
-from dmp_cpg_ros.robot.robot_file import OWN_ROBOT, RobotFile, load_robot_file
+from dmp_cpg_ros.robot.robot_file import (
+    OWN_ROBOT,
+    USUAL_VELOCITY_LIMIT,
+    RobotFile,
+    load_robot_file,
+)
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 STANCE_LEG_SHARE = 0.7  # distance hip-foot over leg length when the model has no usable home pose
-USUAL_VELOCITY_LIMIT = 30.0  # [rad/s] Unitree Go1's published figure, for models that say nothing
 GAIN_OVER_WEIGHT = 1.7  # kp / (m g L); gives 60 N m/rad for 9 kg and legs of 0.4 m
 DAMPING_TIME = 0.15  # kd / kp in units of sqrt(L / g)
 DAMPING_SHARE = 0.5

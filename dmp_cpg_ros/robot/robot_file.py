@@ -16,13 +16,35 @@ from typing import Any, TypeVar
 
 from dmp_cpg_ros.configuration import find_config, load_yaml, naming, other_than_file
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
-from dmp_cpg_ros.core.parameters import check_names, shown
+from dmp_cpg_ros.core.parameters import Key, check_names, needed, shown
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS
+
+USUAL_VELOCITY_LIMIT = 30.0
+"""Unitree Go1's published figure, for models that say nothing [rad/s]."""
 
 T = TypeVar('T')
 Triple = tuple[float, float, float]
 
-_REQUIRED = ('model', 'base', 'joints', 'feet')
+KEYS = {
+    'model': Key('text', 'MJCF file: beside this one, among the models of the package, '
+                 '`package://NAME/PATH` or `menagerie://ROBOT/PATH`'),
+    'base': Key('name', 'body that carries the free joint'),
+    'joints': Key('three names by leg', 'abduction, hip and knee joint of the model'),
+    'feet': Key('name by leg', 'geom, site or body of the foot'),
+    'stance_height': Key('number', 'height of the base over the ground when standing', 'm',
+                         'from the model'),
+    'joint_names': Key('three names by leg', 'names in messages and in the URDF',
+                       default=', '.join((*JOINT_NAMES[:3], '...'))),
+    'kp': Key('number, or three', 'stiffness of the joint drive, per joint of a leg', 'N m/rad',
+              'from size and mass'),
+    'kd': Key('number, or three', 'damping of the joint drive, per joint of a leg', 'N m s/rad',
+              'from size and mass'),
+    'torque_limit': Key('number, or three', 'largest torque, per joint of a leg', 'N m',
+                        'from the model'),
+    'velocity_limit': Key('number, or three', 'largest speed, per joint of a leg', 'rad/s',
+                          f'{USUAL_VELOCITY_LIMIT:g}')}
+"""Entries of a robot's file."""
+
 _PER_JOINT = ('kp', 'kd', 'torque_limit', 'velocity_limit')
 
 MENAGERIE = 'menagerie://'
@@ -105,8 +127,7 @@ def load_robot_file(robot: RobotFile | Path | str | None) -> RobotFile:
 
 def _read(path: Path) -> RobotFile:
     content, where = load_yaml(path), f"robot file '{path}'"
-    check_names(content, (*_REQUIRED, 'stance_height', 'joint_names', *_PER_JOINT), _REQUIRED,
-                where)
+    check_names(content, KEYS, needed(KEYS), where)
     for key in ('joints', 'feet', *(['joint_names'] if 'joint_names' in content else [])):
         check_names(content[key], LEGS, LEGS, f"{where}: '{key}'")
     model = _name(content['model'], f"{where}: 'model'")

@@ -6,24 +6,34 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 pytest.importorskip('rclpy')
 
 import ros_processes
 from checkout import ROOT
+from demonstrations import joint_angles, walking_joints
 from rcl_interfaces.srv import ListParameters
 from ros_processes import Processes, Ros, composed_suite
 
 from dmp_cpg_ros.commands import reference
+from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.learning.discrete import learn_discrete
+from dmp_cpg_ros.core.learning.rhythmic import learn_rhythmic
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.core.scenario.fault import Fault
 from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS, Event, Scenario
 from dmp_cpg_ros.nodes.framework.parameters import FOREIGN_PREFIXES
 from dmp_cpg_ros.nodes.messages.interfaces import COMMAND_INTERFACES, SERVICES, TOPICS, Interface
+from dmp_cpg_ros.primitive_files import load_primitive, save_primitive
+from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file
 from dmp_cpg_ros.suite_table import DRIVER, KINDS, RECORDER, VISUALIZATION
 
 shared_domain, shared_ros = ros_processes.shared_domain, ros_processes.shared_ros
@@ -173,6 +183,52 @@ def refusal(failure: dict[str, Any]) -> str:
     except DmpCpgError as error:
         return str(error)
     return ''
+
+
+def test_the_entries_of_a_robot_are_those_that_its_reader_takes(tmp_path: Path) -> None:
+    file = own_robot_file()
+    names = {leg: list(JOINT_NAMES[3 * k:3 * k + 3]) for k, leg in enumerate(LEGS)}
+    whole = {
+        'model': str(file.model), 'base': file.base,
+        'joints': dict(zip(LEGS, map(list, file.joints), strict=True)),
+        'feet': dict(zip(LEGS, file.feet, strict=True)), 'stance_height': 0.3,
+        'joint_names': names, 'kp': 1.0, 'kd': [1.0, 1.0, 1.0], 'torque_limit': 1.0,
+        'velocity_limit': 1.0}
+
+    def read(content: dict[str, Any]) -> None:
+        path = tmp_path / 'robot.yaml'
+        path.write_text(yaml.safe_dump(content), encoding='utf-8')
+        load_robot_file(path)
+
+    told = entries('robots')
+    assert told.keys() == whole.keys()
+    assert {name for name, is_needed in told.items() if is_needed} == refuses(read, whole)
+
+
+def test_the_entries_of_a_gait_are_those_that_its_reader_takes() -> None:
+    whole = {'lag': dict.fromkeys(LEGS, 0.0), 'speed': [0.1], 'cadence': [0.5],
+             'duty_factor': [0.5], 'highest_speed': 1.0}
+    told = entries('gaits')
+    assert told.keys() == whole.keys()
+    assert {name for name, is_needed in told.items() if is_needed} == refuses(
+        partial(Gait.from_mapping, 'it'), whole)
+
+
+def test_the_entries_of_primitives_are_those_that_are_written_and_needed(tmp_path: Path) -> None:
+    path, written = tmp_path / 'primitive.yaml', set()
+    for primitive in (learn_discrete(joint_angles(), 7),
+                      learn_rhythmic(walking_joints(), 7, period=0.5)):
+        save_primitive(primitive, path)
+        whole = load_yaml(path)
+
+        def read(content: dict[str, Any]) -> None:
+            path.write_text(yaml.safe_dump(content), encoding='utf-8')
+            load_primitive(path)
+
+        assert refuses(read, whole) == whole.keys()
+        written |= whole.keys()
+    told = entries('primitives')
+    assert told.keys() == written and all(told.values())
 
 
 def test_every_file_is_told_of_in_a_whole_sentence_of_its_own() -> None:

@@ -28,6 +28,7 @@ from dmp_cpg_ros.core.gait.speed_limit import fastest_swing, swing_acceleration,
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Triple
+from dmp_cpg_ros.core.parameters import Key, check_names, needed
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 BACKWARD_WEIGHT, ONE_SIDED_WEIGHT = 1.3, 2.0
@@ -37,6 +38,15 @@ of one that stands on one side only.
 
 WIDE_STANCE = 0.75
 """Share of stance on both sides, or ends, from which on a gait counts as standing on both."""
+
+
+KEYS = {
+    'lag': Key('number by leg', 'fraction of a cycle by which the leg follows fl, in [0, 1)'),
+    'speed': Key('list', 'foot speeds u / sqrt(g l), increasing; l is the height of the hips'),
+    'cadence': Key('list', 'stride frequencies f sqrt(l / g) at these speeds'),
+    'duty_factor': Key('list', 'share of a cycle that a foot stands, in (0, 1), at these speeds'),
+    'highest_speed': Key('number', 'foot speed that is never exceeded', default='no limit')}
+"""Entries of a gait."""
 
 
 class Pace(NamedTuple):
@@ -250,18 +260,15 @@ class Gait(CycleOfLegs):
         ParameterError
             If a key is missing or not known, or a value is impossible.
         """
-        valid, optional = ('lag', 'speed', 'cadence', 'duty_factor'), 'highest_speed'
-        if not isinstance(values, Mapping) or set(values) - {optional} != set(valid):
-            raise ParameterError(
-                f"gait '{name}' must have the keys {', '.join(valid)} and may have {optional}, "
-                'no others')
+        check_names(values, KEYS, needed(KEYS), f"gait '{name}'")
         lag = values['lag']
         if not isinstance(lag, Mapping) or set(lag) != set(LEGS):
             raise ParameterError(f"gait '{name}': lag must name the legs {', '.join(LEGS)}")
         try:
-            speed, cadence, duty = (np.asarray(values[key], dtype=float) for key in valid[1:])
+            speed, cadence, duty = (np.asarray(values[key], dtype=float)
+                                    for key in ('speed', 'cadence', 'duty_factor'))
             return cls(name, np.array([float(lag[leg]) for leg in LEGS]), speed, cadence, duty,
-                       float(values.get(optional, inf)))
+                       float(values.get('highest_speed', inf)))
         except (TypeError, ValueError) as error:
             raise ParameterError(f"gait '{name}': {error}") from error
 

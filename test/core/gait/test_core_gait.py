@@ -115,7 +115,7 @@ def test_foot_speed_bounds_the_speed_of_every_foot(
     ({'cadence': [0.3, np.nan]}, 'cadence must be positive'),
     ({'duty_factor': [0.7, 1.0]}, 'in \\(0, 1\\)'),
     ({'duty_factor': ['x', 1.0]}, 'made'),
-    ({'stride': 1.0}, 'have the keys lag, speed, cadence, duty_factor'),
+    ({'stride': 1.0}, "no entry 'stride'; valid are lag, speed, cadence, duty_factor"),
 ])
 def test_impossible_gaits_are_refused(changes: dict[str, object], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
