@@ -51,7 +51,9 @@ SLOWEST, FASTEST, LOWEST, MOST_TURNED = 0.35, 0.65, 0.15, 0.5
 
 @dataclass
 class Outcome:
-    """What came of an attack; it failed when the robot walked on."""
+    """What came of an attack; it failed when the robot walked on. The memory is that which the
+    suite's processes had after it together [MB].
+    """
 
     attack: str
     messages: int
@@ -59,6 +61,7 @@ class Outcome:
     speed: float
     turned: float
     named_s: float
+    memory_mb: float = nan
 
     @property
     def walked_on(self) -> bool:
@@ -130,7 +133,8 @@ def attacked(node: Intruder, suite: Suite, name: str) -> Outcome:
         node.spin(0.1)
     fell = node.fell or not suite.running() or node.poses[-1].z < LOWEST
     return Outcome(name, node.sent - sent, fell, node.speed(),
-                   remainder(node.poses[-1].yaw - heading, tau), max(named - node.begin, 0.0))
+                   remainder(node.poses[-1].yaw - heading, tau), max(named - node.begin, 0.0),
+                   suite.memory_mb())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -168,16 +172,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 if not outcomes[-1].walked_on:
                     suite.start(node)
         finally:
-            memory = suite.memory_mb()
             suite.end()
             rclpy.try_shutdown()
     print(table(outcomes))
     print(f'{node.sent:,} messages and requests, seed {options.seed}; memory of the suite at the '
-          f'begin {suite.begin_mb:.0f} MB, at the end {memory:.0f} MB')
+          f'begin {suite.begin_mb:.0f} MB, {memories(outcomes)}')
     write_results(options.json, {
         'seed': options.seed, 'duration_s': options.duration, 'messages': node.sent,
-        'memory_mb': [suite.begin_mb, memory], 'attacks': list(map(asdict, outcomes))})
+        'begin_mb': suite.begin_mb, 'attacks': list(map(asdict, outcomes))})
     return int(not all(outcome.walked_on and outcome.told for outcome in outcomes))
+
+
+def memories(outcomes: Sequence[Outcome]) -> str:
+    """Memory of the suite each time that every attack has been made once more, and at the end."""
+    kinds = len({outcome.attack for outcome in outcomes})
+    rounds = [f'{one.memory_mb:.0f}' for one in outcomes[kinds - 1::kinds]]
+    return (f'{", ".join(rounds)} MB after every attack, at the end '
+            f'{outcomes[-1].memory_mb:.0f} MB')
 
 
 def table(outcomes: Sequence[Outcome]) -> str:

@@ -11,6 +11,7 @@ sleeps. The policy needs no privilege and changes nobody's share of the processo
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import faulthandler
 import gc
 import os
@@ -83,6 +84,20 @@ def prepare_middleware() -> None:
         os.environ.update(dict.fromkeys(VARIABLES, subnet))
 
 
+M_MMAP_THRESHOLD, MAPPED_BYTES = -3, 2**20
+"""Option of mallopt(3), and the size from which memory is mapped, and given back when it is freed.
+"""
+
+
+def give_back_memory() -> None:
+    """Give large blocks back to the system when they are freed: glibc otherwise learns to keep as
+    much as the largest message of a stranger, and some more, in every node for ever.
+    """
+    mallopt = getattr(ctypes.CDLL(None), 'mallopt', None)  # of glibc
+    if mallopt is not None:
+        mallopt(M_MMAP_THRESHOLD, MAPPED_BYTES)
+
+
 MOST_DOMAIN = 232
 """The highest ROS domain: beyond it the middleware has no ports, and ends the process."""
 
@@ -106,6 +121,7 @@ def start_ros(arguments: Sequence[str], context: Context | None = None) -> None:
     ParameterError
         If ROS refuses its environment, such as ``ROS_DOMAIN_ID``.
     """
+    give_back_memory()
     with _cannot_start():
         rclpy.init(args=[*arguments], context=context,
                    signal_handler_options=SignalHandlerOptions.NO)
