@@ -19,9 +19,9 @@ from std_msgs.msg import Float64MultiArray
 
 from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.clock import RESET_NS, fresh
-from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.parameters import Parameters, parameter, typed
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.robot_model.target_limits import TargetLimits
 from dmp_cpg_ros.nodes.framework.driven_robot import RETREATS, DrivenRobot
@@ -59,10 +59,23 @@ class DriverParameters(Parameters):
     """Parameters of the node."""
 
     command_interfaces: tuple[str, ...] = parameter(
-        ('position',), 'command interfaces of the joints, each with a forward_command_controller; '
-        'without position, effort is the torque of the whole drive law',
+        ('position',), 'command interfaces of the joints, each once and with a '
+        'forward_command_controller; one of them is position, or effort, which without position '
+        'is the torque of the whole drive law; kp and kd are beside position only',
         choices=COMMAND_INTERFACES)
     publish_clock: bool = parameter(True, 'whether to publish /clock, by which silence is noticed')
+
+    def __post_init__(self) -> None:
+        """Validate; the interfaces must close a loop about the joints, and be there once."""
+        super().__post_init__()
+        given = set(self.command_interfaces)
+        if not given & {'position', 'effort'} or (
+                given & {'kp', 'kd'} and 'position' not in given) or (
+                len(given) < len(self.command_interfaces)):
+            raise ParameterError(
+                f'command_interfaces = {typed(self.command_interfaces)} must have each once, '
+                'position or effort among them, and kp and kd with position only: without, '
+                'nothing holds the joints')
 
 
 class Ros2ControlDriver(DrivenRobot):

@@ -21,10 +21,11 @@ from ros_processes import Ros
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import SetBool
 
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.modes.motion_library import lying_posture
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS
 from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp
-from dmp_cpg_ros.nodes.ros2_control_driver import Ros2ControlDriver
+from dmp_cpg_ros.nodes.ros2_control_driver import DriverParameters, Ros2ControlDriver
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.suite_table import DRIVER
 
@@ -110,6 +111,22 @@ def test_joint_states_that_have_fallen_silent_do_not_enable(ros: Ros) -> None:
         made.robot.step()
         made.told()
         assert made.enable().success
+
+
+@pytest.mark.parametrize('given', [
+    'position', 'effort', 'velocity effort', 'position velocity', 'position kp kd',
+    'kd position velocity effort kp'])
+def test_interfaces_that_close_a_loop_are_taken(given: str) -> None:
+    assert DriverParameters(command_interfaces=tuple(given.split())).command_interfaces
+
+
+@pytest.mark.parametrize('given', [
+    '', 'velocity', 'kp kd', 'velocity kp kd', 'effort kp kd', 'velocity effort kd',
+    'position position', 'effort velocity effort'])
+def test_interfaces_that_close_no_loop_or_come_twice_are_refused(ros: Ros, given: str) -> None:
+    with pytest.raises(ParameterError, match='each once, position or effort'):
+        Ros2ControlDriver(context=ros.context, parameter_overrides=[
+            Parameter('command_interfaces', Parameter.Type.STRING_ARRAY, given.split())]).start()
 
 
 def test_torques_alone_bring_the_robot_to_its_belly_and_keep_their_limits(ros: Ros) -> None:
