@@ -13,6 +13,7 @@ from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.grounds import World
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 
 CONTACT_WEIGHT_SHARE = 0.02
 """A foot is on the ground while it carries more than this share of the weight."""
@@ -54,6 +55,11 @@ class RunContext:
         if self.robot is None:
             return USUAL_CONTACT_FORCE
         return CONTACT_WEIGHT_SHARE * self.robot.mass * GRAVITY
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """What the robot calls its joints, in the order of ``JOINT_NAMES``."""
+        return JOINT_NAMES if self.robot is None else self.robot.joint_names
 
 
 def find_parameter(parameters: Mapping[str, Any] | None, name: str, default: Any = None) -> Any:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from dmp_cpg_ros.analysis.metrics.summary import STILL_SPEED
+from dmp_cpg_ros.core.parameters import shown
 
 SPEED_TOLERANCE = 0.10
 """Relative error of steady speed that is accepted."""
@@ -58,8 +59,11 @@ def facts(metrics: Mapping[str, Any], lock_step: bool | None = None) -> list[Fac
     list of Fact
         In the order of importance.
     """
-    missing = metrics['recording']['missing_topics']
+    missing, foreign = (metrics['recording'][of] for of in ('missing_topics', 'foreign_joints'))
     return [*([Fact('Nothing was recorded on', ', '.join(missing), None)] if missing else []),
+            *(Fact(f"{topic} names joints that are not the robot's",
+                   f'{shown(", ".join(names))}; give --robot FILE', False)
+              for topic, names in foreign.items() if names),
             *_walking(metrics), *_stops(metrics), *_timing(metrics['timing'], lock_step),
             *_certificate(metrics)]
 

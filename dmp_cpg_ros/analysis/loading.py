@@ -28,7 +28,8 @@ Statuses = Sequence[tuple[str, StatusEvent]]
 """Names and statuses, as they came."""
 
 
-def load_recording(path: Path | str, *, only: Mapping[str, Sequence[str]] | None = None,
+def load_recording(path: Path | str, *, joint_names: Sequence[str] = JOINT_NAMES,
+                   only: Mapping[str, Sequence[str]] | None = None,
                    tell: Callable[[str], None] = lambda text: None) -> Recording:
     """Read a recording.
 
@@ -36,6 +37,9 @@ def load_recording(path: Path | str, *, only: Mapping[str, Sequence[str]] | None
     ----------
     path : path-like
         A rosbag2 folder (MCAP or SQLite), one file of it, or a run's folder with ``bag/`` inside.
+    joint_names : sequence of str, optional
+        What messages call the twelve joints if neither a ``robot_description`` in the recording
+        says it nor they have their usual names.
     only : mapping of str to sequence of str, optional
         Fields that are read of a topic of joint states, where that is not all of them; the others
         are NaN and take no memory.
@@ -55,7 +59,7 @@ def load_recording(path: Path | str, *, only: Mapping[str, Sequence[str]] | None
         that cannot be decoded are no error: they are left out, counted and warned of.
     """
     with naming(path):
-        return _loaded(find_bag(path), {**FIELDS, **(only or {})}, tell)
+        return _loaded(find_bag(path), {**FIELDS, **(only or {})}, joint_names, tell)
 
 
 def _read(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str], None]
@@ -87,15 +91,15 @@ def _read(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str], 
     return topics, counts
 
 
-def _loaded(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str], None]
-            ) -> Recording:
+def _loaded(bag: Path, fields: Mapping[str, Sequence[str]], joint_names: Sequence[str],
+            tell: Callable[[str], None]) -> Recording:
     topics, counts = _read(bag, fields, tell)
     skipped = Counter[str]()
     for topic in topics.values():
         skipped += topic.skipped
     warn_of(skipped)
     commands, arrivals = _on_robot_clock(topics), _arrivals(topics)
-    modes, names = _modes(topics), _joint_names(topics['robot_description'].text)
+    modes, (names, foreign) = _modes(topics), _joint_names(topics, joint_names)
     # Bags of others have one odometry, and in old ones of this suite it is the truth.
     truth, estimate = (('ground_truth', 'odom') if topics['ground_truth'].blocks
                        else ('odom', 'estimated_odom'))
@@ -111,14 +115,23 @@ def _loaded(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str]
         feet=_feet(topics['foot_contacts']),
         inhibition=_changes(topics['inhibition_state'].statuses, lambda e: (e.message, e.values)),
         modes=modes, statuses=_by_name(topics['diagnostics'].statuses),
-        arrivals=arrivals, counts=counts, undecodable=dict(skipped))
+        arrivals=arrivals, counts=counts, undecodable=dict(skipped), foreign_joints=foreign)
 
 
-def _joint_names(description: str) -> tuple[str, ...]:
-    """Names of our joints in a recording, as ``robot/urdf.py`` says them."""
-    named = {usual: name for name, usual in re.findall(
-        r'<dmp_cpg_ros_joint name="([^"]+)" usual="([^"]+)"', description)}
-    return tuple(named.get(usual, usual) for usual in JOINT_NAMES)
+def _joint_names(topics: Mapping[str, Topic], given: Sequence[str],
+                 ) -> tuple[Sequence[str], dict[str, tuple[str, ...]]]:
+    """Names of our joints in a recording: of those that ``robot/urdf.py`` says, the usual ones and
+    those given, what most are called; and names of others, of topics that lack some of ours.
+    """
+    described = {usual: name for name, usual in re.findall(
+        r'<dmp_cpg_ros_joint name="([^"]+)" usual="([^"]+)"', topics['robot_description'].text)}
+    held = {topic: dict.fromkeys(name for names, _ in topics[topic].blocks for name in names)
+            for topic in recording.OF_JOINTS}
+    every = {name for names in held.values() for name in names}
+    ours = max(([described.get(usual, usual) for usual in JOINT_NAMES], JOINT_NAMES, given),
+               key=lambda names: len(every.intersection(names)))
+    return ours, {topic: others for topic, names in held.items() if set(ours) - names.keys()
+                  and (others := tuple(name for name in names if name not in ours))}
 
 
 def _on_robot_clock(topics: Mapping[str, Topic]) -> Block:

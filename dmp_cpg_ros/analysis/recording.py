@@ -24,6 +24,9 @@ from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
 Rows = TypeVar('Rows', bound='Series')
 
+OF_JOINTS = ('joint_states', 'joint_targets')
+"""Topics whose joints may have names of their own."""
+
 
 def no_rows(*axes: Sequence[str], unit: str = '') -> Any:
     """Field of a dataclass that is an array without rows by default, with the names along its
@@ -236,6 +239,8 @@ class Recording:
     undecodable : mapping of str to int
         Those among them, on topics that the analysis reads, that were left out because they could
         not be decoded.
+    foreign_joints : mapping of str to tuple of str
+        By topic of ``OF_JOINTS`` that lacks joints of the robot, the names of others in it.
     """
 
     joints: JointSeries = JointSeries()
@@ -253,13 +258,14 @@ class Recording:
     arrivals: ArrivalSeries = ArrivalSeries()
     counts: Mapping[str, int] = field(default_factory=dict)
     undecodable: Mapping[str, int] = field(default_factory=dict)
+    foreign_joints: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @classmethod
-    def load(cls, path: Path | str) -> Recording:
+    def load(cls, path: Path | str, **options: Any) -> Recording:
         """Read a recording, see :func:`~dmp_cpg_ros.analysis.loading.load_recording`."""
         from dmp_cpg_ros.analysis.loading import load_recording
 
-        return load_recording(path)
+        return load_recording(path, **options)
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Columns of all that was recorded, by table and by name.
@@ -304,7 +310,8 @@ class Recording:
             'ground_truth': self.odometry.time, 'odom': self.estimate.time,
             'foot_contacts': self.feet.time, 'inhibition_state': self.inhibition,
             'diagnostics': self.statuses}
-        return [topic for topic, of in read.items() if not len(of)]
+        return [topic for topic, of in read.items()
+                if not len(of) and topic not in self.foreign_joints]
 
     @property
     def span(self) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.analysis.bag import find_bag, payload_digests
-from dmp_cpg_ros.analysis.context import find_parameter
+from dmp_cpg_ros.analysis.context import RunContext, find_parameter
 from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.manifest import build_manifest
@@ -101,8 +101,8 @@ def analyze_run(
     bag = bag.resolve()
     beside = bag.with_name(f'{bag.name if bag.is_dir() else bag.stem}_analysis')
     folder = Path(out) if out is not None else run or beside
-    return write_results(folder, _recording(bag, export, tell), context, manifest, certificate,
-                         draw, report, tell)
+    return write_results(folder, _recording(bag, context, export, tell), context, manifest,
+                         certificate, draw, report, tell)
 
 
 M_MMAP_THRESHOLD, LARGE = -3, 4 << 20
@@ -114,10 +114,11 @@ SHOWN = {'joint_targets': ('position',), 'canonical_state': ('position',)}
 """Fields that a report shows of topics of which it does not show all."""
 
 
-def _recording(bag: Path, export: Callable[[Recording], None] | None, tell: Callable[[str], None]
-               ) -> Recording:
+def _recording(bag: Path, context: RunContext, export: Callable[[Recording], None] | None,
+               tell: Callable[[str], None]) -> Recording:
     """Recording of which nobody but the caller keeps the arrays."""
-    recording = load_recording(bag, only=None if export else SHOWN, tell=tell)
+    recording = load_recording(bag, joint_names=context.joint_names,
+                               only=None if export else SHOWN, tell=tell)
     if export is not None:
         tell('tables')
         export(recording)

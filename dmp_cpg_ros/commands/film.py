@@ -155,7 +155,8 @@ def film_run(run: Path, path: Path, shot: Shot | None = None) -> int:
     """
     parameters = read_json(run / 'manifest.json').get('parameters')
     context, robot_file = run_context(parameters)
-    return film(load_recording(run), context, robot_file, path, shot)
+    recording = load_recording(run, joint_names=context.joint_names)
+    return film(recording, context, robot_file, path, shot)
 
 
 def has_encoder() -> bool:

@@ -68,13 +68,17 @@ def read_motion(path: Path, topic: str = 'joint_targets', robot_file: Path | Non
     """
     if topic not in ('joint_targets', 'joint_states'):
         raise DataError(f"a motion is learned from joint_targets or joint_states, not '{topic}'")
-    recording, run = load_recording(path), run_of(bag.find_bag(path), path)
+    run = run_of(bag.find_bag(path), path)
+    known = {} if run is None else read_json(run / 'manifest.json')
+    parameters = known.get('parameters') or {}
+    context, _ = run_context(parameters, robot_file)
+    recording = load_recording(path, joint_names=context.joint_names)
     joints = recording.targets if topic == 'joint_targets' else recording.joints
     canonical = recording.canonical
     walked = next((gait.before for gait in canonical.gaits if not gait.after), 'amble')
-    known = {} if run is None else read_json(run / 'manifest.json')
-    parameters = known.get('parameters') or {'gait': walked}
-    context, _ = run_context(parameters, robot_file)
+    if not parameters:
+        parameters = {'gait': walked}
+        context, _ = run_context(parameters, robot_file)
     rows, at, attitude = motion.common_rows(joints.time, canonical.time, recording.odometry.time)
     if not len(rows):
         raise DataError(f"'{path}': no stamp has all of {topic}, canonical_state and "

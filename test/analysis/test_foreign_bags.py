@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import yaml
 import zstandard
+from checkout import ROOT
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
@@ -31,6 +32,7 @@ from dmp_cpg_ros.analysis.rescue import Unpacker
 from dmp_cpg_ros.commands.analyze import main
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
 Message = tuple[Connection, int, bytes]
 STORAGES = [StoragePlugin.MCAP, StoragePlugin.SQLITE3]
@@ -191,6 +193,59 @@ def test_topics_that_are_missing_are_named_and_the_rest_is_reported(
     assert 'inhibition_state' in named and 'joint_targets' in named
     assert 'Nothing was recorded on' in (tmp_path / 'outing_analysis' / 'report.html').read_text(
         encoding='utf-8')
+
+
+def renamed(bag: Path, folder: Path, names: dict[str, str]) -> Path:
+    """The bag with other names of joints."""
+    def said(of: Connection, raw: bytes) -> bytes:
+        message = STORE.deserialize_cdr(raw, of.msgtype)
+        if of.topic.endswith(('joint_states', 'joint_targets')):
+            message.name = [names.get(name, name) for name in message.name]
+        return bytes(STORE.serialize_cdr(message, of.msgtype))
+
+    return rewritten([(of, time, said(of, raw)) for of, time, raw in messages_of(bag)], folder)
+
+
+def test_joints_with_the_names_of_a_robot_file_are_read(
+        walked: Recording, plain: Path, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    theirs = [f'{leg.upper()}_{joint}' for leg in LEGS for joint in ('HAA', 'HFE', 'KFE')]
+    bag = renamed(plain, tmp_path / 'outing', dict(zip(JOINT_NAMES, theirs, strict=True)))
+    own = yaml.safe_load((ROOT / 'config' / 'robots' / 'mini_quadruped.yaml').read_text())
+    file = tmp_path / 'theirs.yaml'
+    file.write_text(yaml.safe_dump({**own, 'joint_names': {
+        leg: theirs[3 * i:3 * i + 3] for i, leg in enumerate(LEGS)}}), encoding='utf-8')
+
+    def said(*arguments: str) -> str:
+        assert main([str(bag), '--no-pictures', *arguments]) == 0
+        return capsys.readouterr().out
+
+    unknown, known = said(), said('--robot', str(file), '--csv', str(tmp_path / 'tables'))
+    for topic in ('joint_states', 'joint_targets'):
+        assert f"{topic} names joints that are not the robot's: 'FL_HAA, FL_HFE" in unknown
+    assert 'give --robot FILE' in unknown and 'give --robot' not in known
+    for text in (unknown, known):
+        assert not any('joint_states' in line.partition('recorded on')[2]
+                       for line in text.splitlines())
+    assert_same(load_recording(bag, joint_names=theirs), walked)
+    assert_same(load_recording(plain, joint_names=theirs), walked)
+    assert (tmp_path / 'tables' / 'joints.csv').is_file()
+
+
+def test_a_joint_of_another_beside_all_of_the_robot_is_not_reported(
+        plain: Path, tmp_path: Path) -> None:
+    named = {JOINT_NAMES[0]: 'first'}
+    assert load_recording(renamed(plain, tmp_path / 'lacking', named)).foreign_joints == {
+        topic: ('first',) for topic in ('joint_states', 'joint_targets')}
+    messages = messages_of(plain)
+    of, time, raw = next(m for m in messages if m[0].topic.endswith('joint_states'))
+    message = STORE.deserialize_cdr(raw, of.msgtype)
+    for name in ('name', 'position', 'velocity', 'effort'):
+        setattr(message, name, [*getattr(message, name), 'arm' if name == 'name' else 0.0])
+    for name in ('position', 'velocity', 'effort'):
+        setattr(message, name, np.array(getattr(message, name)))
+    more = (of, time, bytes(STORE.serialize_cdr(message, of.msgtype)))
+    assert not load_recording(rewritten([*messages, more], tmp_path / 'arm')).foreign_joints
 
 
 # --- hostile ----------------------------------------------------------------------------------

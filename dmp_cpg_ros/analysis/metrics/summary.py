@@ -19,7 +19,7 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import Episode
 from dmp_cpg_ros.analysis.metrics import robot
 from dmp_cpg_ros.analysis.motion import held, mean_between
-from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent, taken
+from dmp_cpg_ros.analysis.recording import OF_JOINTS, Array, Recording, StatusEvent, taken
 from dmp_cpg_ros.core.canonical.phase import phase, wrapped
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.suite_table import ROBOT
@@ -230,7 +230,9 @@ def compute_metrics(
                            for start in episodes.episodes(recording, episodes.STARTING)]),
         'timing': timing_metrics(recording),
         'recording': {'undecodable_messages': sum(recording.undecodable.values()),
-                      'missing_topics': recording.missing or None},
+                      'missing_topics': recording.missing or None,
+                      'foreign_joints': {topic: recording.foreign_joints.get(topic)
+                                         for topic in OF_JOINTS}},
         'certificate': None if certificate is None else list(certificate)}
 
 
