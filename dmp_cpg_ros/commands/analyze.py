@@ -12,6 +12,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +31,13 @@ from dmp_cpg_ros.analysis.tables import (
     write_csv,
     write_parquet,
 )
-from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT, RosArguments, one_line, run_command
 from dmp_cpg_ros.commands.run_folder import picture_taker, run_context, run_of
-from dmp_cpg_ros.configuration import writable
-from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.configuration import naming, writable
+from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+
+PARTLY = 1
+"""Exit status where some of several runs could not be used."""
 
 BAG_ALONE = {'note': 'made from a bag alone: versions, commit and host are those of the analysis'}
 
@@ -132,7 +136,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog='analyze',
         description='Make figures, metrics.json, manifest.json and report.html of a recorded run; '
         'of several runs metrics.json and manifest.json of each, and one table with the runs side '
-        'by side.')
+        'by side.',
+        epilog='Exit status: 0 when all went well, 1 when some of several runs could not be used, '
+        '2 for bad input.')
     add = parser.add_argument
     add('bags', metavar='BAG_OR_RUN', type=Path, nargs='+',
         help="rosbag2 folder or file (MCAP or SQLite), or a run's folder with bag/ inside")
@@ -173,20 +179,33 @@ def _compare(options: argparse.Namespace) -> int:
     """Several runs side by side."""
     if options.csv or options.parquet:
         raise ParameterError('--csv and --parquet write the tables of one run')
-    runs = {}
+    runs, problems = {}, []
     parent = Path(os.path.commonpath([path.absolute().parent for path in options.bags]))
     for path in options.bags:
-        tell = Progress(f'{path}: ')
-        results = analyze_run(path, robot_file=options.robot, report=False, tell=tell)
-        runs[str(path.absolute().relative_to(parent))] = results.metrics
+        tell, run = Progress(f'{path}: '), str(path.absolute().relative_to(parent))
+        others = (f'{run} ({k})' for k in count(2))
+        name = run if run not in runs else next(of for of in others if of not in runs)
+        try:
+            with naming(path):
+                results = analyze_run(path, robot_file=options.robot, report=False, tell=tell)
+            runs[name] = results.metrics
+        except DmpCpgError as error:  # the others are compared all the same
+            problems.append(one_line(str(error)))
+    if runs:
+        _tell_side_by_side(runs, options.out)
+    for problem in problems:
+        print(f'analyze: left out: {problem}', file=sys.stderr)
+    return (PARTLY if runs else BAD_INPUT) if problems else 0
+
+
+def _tell_side_by_side(runs: Mapping[str, Mapping[str, Any]], out: Path | None) -> None:
     head, rows = side_by_side(runs)
     table = markdown_table(head, [[as_text(cell) for cell in row] for row in rows])
     print(table)
-    if options.out is not None:
-        options.out.mkdir(parents=True, exist_ok=True)
-        writable(options.out / 'comparison.md').write_text(f'{table}\n', encoding='utf-8')
-        write_json(options.out / 'comparison.json', runs)
-    return 0
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        writable(out / 'comparison.md').write_text(f'{table}\n', encoding='utf-8')
+        write_json(out / 'comparison.json', runs)
 
 
 class Progress:

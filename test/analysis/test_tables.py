@@ -19,7 +19,7 @@ from synthetic_walk import SyntheticWalk
 
 from dmp_cpg_ros.analysis import Recording
 from dmp_cpg_ros.analysis.recording import Series
-from dmp_cpg_ros.commands.analyze import Progress, main
+from dmp_cpg_ros.commands.analyze import PARTLY, Progress, main
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
@@ -114,6 +114,26 @@ def test_runs_stand_side_by_side(bag: Path, tmp_path: Path, capsys: pytest.Captu
     counts = next(row for row in rows if row[0] == 'stop.completed')
     assert counts[2:5] == ['1', '1', '0']
     assert main([str(bag), str(slow), '--csv', str(tmp_path / 'tables')]) == BAD_INPUT
+
+
+def test_a_run_that_cannot_be_used_is_named_and_the_others_are_compared(
+        bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    broken = tmp_path / 'broken'
+    broken.mkdir()
+    (broken / 'bag.mcap').write_bytes(b'nothing of a bag')
+    assert main([str(bag), str(broken), str(bag)]) == PARTLY
+    said = capsys.readouterr()
+    head, _, *rows = ([cell.strip() for cell in line.strip('|').split('|')]
+                      for line in said.out.splitlines())
+    first = head[2]
+    assert head[2:] == [first, f'{first} (2)', f'Δ {first} (2)']
+    walked = next(row for row in rows if row[0] == 'robot.distance_m')
+    assert walked[2] == walked[3] and walked[4] == '0'
+    (line,) = said.err.splitlines()
+    assert line.startswith('analyze: left out: ') and str(broken) in line
+    assert main([str(broken), str(tmp_path / 'nowhere')]) == BAD_INPUT
+    said = capsys.readouterr()
+    assert not said.out and len(said.err.splitlines()) == 2
 
 
 def test_progress_is_told_on_stderr(capsys: pytest.CaptureFixture[str],
