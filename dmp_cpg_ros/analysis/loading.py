@@ -18,7 +18,7 @@ from dmp_cpg_ros import layouts
 from dmp_cpg_ros.analysis import recording
 from dmp_cpg_ros.analysis.bag import base_name, find_bag, opened, recorded, warn_of
 from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent
-from dmp_cpg_ros.analysis.topics import ALL_FIELDS, AT_ONCE, FIELDS, TOPICS, Block, Topic
+from dmp_cpg_ros.analysis.topics import ALL_FIELDS, FIELDS, TOPICS, Block, Topic, in_batches
 from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares
@@ -72,21 +72,11 @@ def _read(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str], 
         used = [c for c in reader.connections if base_name(c.topic) in TOPICS.get(c.msgtype, ())]
         topics = {name: Topic(name, fields.get(name, ALL_FIELDS))
                   for names in TOPICS.values() for name in names}
-        waiting: dict[tuple[str, str], tuple[list[int], list[bytes]]] = {
-            (of.topic, of.msgtype): ([], []) for of in used}
         taken, total = 0, sum(of.msgcount for of in used)
-        for connection, bag_ns, raw in recorded(reader, used):
-            key = connection.topic, connection.msgtype
-            times, raws = waiting[key]
-            times.append(bag_ns)
-            raws.append(raw)
-            if len(raws) == AT_ONCE:
-                topics[base_name(key[0])].take(*key, times, raws)
-                waiting[key] = [], []
-                taken += AT_ONCE
-                tell(f'reading: {taken:,} of {total:,} messages')
-        for key, of in waiting.items():
-            topics[base_name(key[0])].take(*key, *of)
+        for (topic, kind), times, raws in in_batches(recorded(reader, used)):
+            topics[base_name(topic)].take(topic, kind, times, raws)
+            taken += len(raws)
+            tell(f'reading: {taken:,} of {total:,} messages')
         counts = {topic: info.msgcount for topic, info in sorted(reader.topics.items())}
     return topics, counts
 
@@ -108,10 +98,10 @@ def _loaded(bag: Path, fields: Mapping[str, Sequence[str]], joint_names: Sequenc
         targets=_joints(topics.pop('joint_targets'), names),
         work=_work(topics['joint_work'], names),
         canonical=_canonical(topics['canonical_state']),
-        reference=recording.VelocitySeries(*_rows(topics['reference'].joined(3), (3,))),
-        commands=recording.VelocitySeries(*_rows(commands, (3,))),
-        odometry=recording.OdometrySeries(*_rows(topics.pop(truth).joined(13), (3, 4, 3, 3))),
-        estimate=recording.OdometrySeries(*_rows(topics[estimate].joined(13), (3, 4, 3, 3))),
+        reference=recording.VelocitySeries(*rows_of(topics['reference'].joined(3), (3,))),
+        commands=recording.VelocitySeries(*rows_of(commands, (3,))),
+        odometry=recording.OdometrySeries(*rows_of(topics.pop(truth).joined(13), (3, 4, 3, 3))),
+        estimate=recording.OdometrySeries(*rows_of(topics[estimate].joined(13), (3, 4, 3, 3))),
         feet=_feet(topics['foot_contacts']),
         inhibition=_changes(topics['inhibition_state'].statuses, lambda e: (e.message, e.values)),
         modes=modes, statuses=_by_name(topics['diagnostics'].statuses),
@@ -149,8 +139,8 @@ def _on_robot_clock(topics: Mapping[str, Topic]) -> Block:
     return commands._replace(stamp=ticks.stamp[np.maximum(before, 0)])
 
 
-def _rows(block: Block, widths: Sequence[int]) -> list[Array]:
-    """Times and columns in the order of the stamps; of one stamp the last counts."""
+def rows_of(block: Block, widths: Sequence[int]) -> list[Array]:
+    """Times [s] and columns in the order of the stamps; of one stamp the last counts."""
     stamps, values = block.stamp, block.values.reshape(-1, sum(widths))
     if (np.diff(stamps) <= 0).any():
         stamps, last = np.unique(stamps[::-1], return_index=True)

@@ -274,8 +274,8 @@ class Recording:
         -------
         dict of str to dict of str to ndarray (n,) or list of str
             Tables are named as the attributes are. Columns are named by quantity, frame, joint or
-            axis, and unit, such as ``position_fl_hip_rad``; states and words of the nodes are
-            texts.
+            axis, and unit, such as ``position_fl_hip_rad``. ``inhibition`` has a column for each
+            key; ``statuses``, whose keys differ from node to node, a row.
         """
         found: dict[str, dict[str, Any]] = {
             of.name: _columns(series) for of in fields(self)
@@ -285,15 +285,25 @@ class Recording:
                 'gait': [of.before for of in gaits], 'next_gait': [of.after for of in gaits],
                 'share_of_next_gait': np.array([of.share for of in gaits]),
                 'cadence_scale': np.array([of.cadence_scale for of in gaits])}
-        told = {'inhibition': [('', of) for of in self.inhibition],
-                'modes': [('', of) for of in self.modes],
-                'statuses': [(name, of) for name, history in self.statuses.items()
-                             for of in history]}
-        return found | {name: {
-            'time_s': np.array([of.time for _, of in events]), 'name': [of for of, _ in events],
-            'message': [of.message for _, of in events],
-            'values': [', '.join(f'{key}={value}' for key, value in of.values.items())
-                       for _, of in events]} for name, events in told.items() if events}
+        for name, events in (('inhibition', self.inhibition), ('modes', self.modes)):
+            if events:
+                columns: dict[str, Any] = {
+                    'time_s': np.array([of.time for of in events]),
+                    'level': np.array([of.level for of in events]),
+                    'message': [of.message for of in events]}
+                for key in dict.fromkeys(key for of in events for key in of.values):
+                    columns.setdefault(key, _told([of.values.get(key) for of in events]))
+                found[name] = columns
+        told = [(name, of, *pair) for name, history in self.statuses.items() for of in history
+                for pair in of.values.items() or [('', '')]]
+        if told:
+            found['statuses'] = {
+                'time_s': np.array([of.time for _, of, *_ in told]),
+                'name': [row[0] for row in told],
+                'level': np.array([of.level for _, of, *_ in told]),
+                'message': [of.message for _, of, *_ in told],
+                'key': [row[2] for row in told], 'value': [row[3] for row in told]}
+        return found
 
     @property
     def diagnostics(self) -> dict[str, StatusEvent]:
@@ -320,6 +330,14 @@ class Recording:
                                            self.reference, self.feet, self.targets)]
         ends = [float(axis[row]) for axis in axes if axis.size for row in (0, -1)]
         return min(ends, default=0.0), max(ends, default=0.0)
+
+
+def _told(values: Sequence[str | None]) -> Array | list[str]:
+    """Column of what a key was said to be: numbers, NaN where it was not, or texts."""
+    try:
+        return np.array([np.nan if of is None else float(of) for of in values])
+    except ValueError:
+        return ['' if of is None else of for of in values]
 
 
 def _columns(series: Series) -> dict[str, Array]:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
-from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.configuration import writable
 from dmp_cpg_ros.core.errors import MissingFileError
 
@@ -18,10 +17,14 @@ AT_ONCE = 10_000
 """Rows that are written together."""
 
 
-def write_csv(recording: Recording, folder: Path) -> None:
+Tables = Mapping[str, Mapping[str, Any]]
+"""Columns by table and by name, as of ``Recording.tables``."""
+
+
+def write_csv(tables: Tables, folder: Path) -> None:
     """Write ``NAME.csv`` of each table, with a line of names of columns."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, columns in recording.tables().items():
+    for name, columns in tables.items():
         with writable(folder / f'{name}.csv').open('w', encoding='utf-8', newline='') as file:
             write = csv.writer(file)
             write.writerow(columns)
@@ -31,7 +34,7 @@ def write_csv(recording: Recording, folder: Path) -> None:
                                       for of in part), strict=True))
 
 
-def write_parquet(recording: Recording, folder: Path) -> None:
+def write_parquet(tables: Tables, folder: Path) -> None:
     """Write ``NAME.parquet`` of each table; raises MissingFileError without ``pyarrow``."""
     try:
         from pyarrow import parquet, table
@@ -39,8 +42,8 @@ def write_parquet(recording: Recording, folder: Path) -> None:
         raise MissingFileError(
             "Parquet needs the package pyarrow: pip install 'dmp_cpg_ros[parquet]'") from error
     folder.mkdir(parents=True, exist_ok=True)
-    for name, columns in recording.tables().items():
-        parquet.write_table(table(columns), writable(folder / f'{name}.parquet'))
+    for name, columns in tables.items():
+        parquet.write_table(table(dict(columns)), writable(folder / f'{name}.parquet'))
 
 
 def side_by_side(runs: Mapping[str, Mapping[str, Any]]) -> tuple[list[str], list[list[Any]]]:

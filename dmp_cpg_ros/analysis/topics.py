@@ -7,19 +7,19 @@ from __future__ import annotations
 import mmap
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros import layouts
-from dmp_cpg_ros.analysis.bag import message_of
+from dmp_cpg_ros.analysis.bag import Received, message_of
 from dmp_cpg_ros.analysis.decoding import Alike, alike
 from dmp_cpg_ros.analysis.recording import Array, StatusEvent
 
 ROWS_OF, WORDS = 'sensor_msgs/msg/JointState', 'diagnostic_msgs/msg/DiagnosticArray'
-TEXT = 'std_msgs/msg/String'
+TEXT, IMU = 'std_msgs/msg/String', 'sensor_msgs/msg/Imu'
 
 TOPICS = {
     ROWS_OF: ('joint_states', 'joint_targets', 'joint_work', 'canonical_state', 'foot_contacts',
@@ -55,11 +55,28 @@ COLUMNS = {
     'geometry_msgs/msg/TwistStamped': (
         'twist.linear.x', 'twist.linear.y', 'twist.angular.z'),
     'geometry_msgs/msg/Twist': ('linear.x', 'linear.y', 'angular.z'),
+    IMU: tuple(f'{part}.{axis}' for part in ('angular_velocity', 'linear_acceleration')
+               for axis in 'xyz'),
     'rosgraph_msgs/msg/Clock': ()}
 """Numbers of the other messages that are read."""
 
 AT_ONCE = 2048
 """Messages of a topic that are decoded together."""
+
+
+def in_batches(received: Iterable[Received],
+               ) -> Iterator[tuple[tuple[str, str], list[int], list[bytes]]]:
+    """At most ``AT_ONCE`` messages of a topic and a type, their record times [ns] and bytes."""
+    waiting: dict[tuple[str, str], tuple[list[int], list[bytes]]] = defaultdict(lambda: ([], []))
+    for connection, bag_ns, raw in received:
+        key = connection.topic, connection.msgtype
+        times, raws = waiting[key]
+        times.append(bag_ns)
+        raws.append(raw)
+        if len(raws) == AT_ONCE:
+            yield key, *waiting.pop(key)
+    for key, of in waiting.items():
+        yield key, *of
 
 
 class Block(NamedTuple):

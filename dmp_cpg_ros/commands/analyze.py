@@ -21,6 +21,7 @@ from dmp_cpg_ros.analysis.context import RunContext, find_parameter
 from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.manifest import build_manifest
+from dmp_cpg_ros.analysis.other_tables import OTHER_TABLES, other_tables
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.run import RunResults, write_results
 from dmp_cpg_ros.analysis.strict_json import read_json, write_json
@@ -150,7 +151,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "package's own)")
     add('--no-pictures', action='store_true', help='take no pictures of the robot')
     add('--csv', metavar='DIR', type=Path,
-        help='write what was recorded as tables in DIR: NAME.csv')
+        help='write what was recorded as tables in DIR: NAME.csv, named as what Recording holds, '
+        f'and {", ".join(OTHER_TABLES)}. Units are in the names of the columns, but those of '
+        "inhibition_gains and posture_feedback, which have the topics' rows by name, in the "
+        'reference')
     add('--parquet', metavar='DIR', type=Path, help='the same as NAME.parquet; needs pyarrow')
     return run_command(parser, arguments, _analyze)
 
@@ -161,9 +165,10 @@ def _analyze(options: argparse.Namespace, _: RosArguments) -> int:
         ctypes.CDLL(None).mallopt(M_MMAP_THRESHOLD, LARGE)
 
     def export(recording: Recording) -> None:
+        tables = recording.tables() | other_tables(find_bag(options.bags[0]), recording)
         for folder, write in ((options.csv, write_csv), (options.parquet, write_parquet)):
             if folder is not None:
-                write(recording, folder)
+                write(tables, folder)
 
     if len(options.bags) > 1:
         return _compare(options)

@@ -10,15 +10,18 @@ import json
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from checkout import ROOT
-from synthetic_bag import write_bag
+from rosbags.rosbag2 import Writer
+from synthetic_bag import STORE, make, write_bag
 from synthetic_walk import SyntheticWalk
 
 from dmp_cpg_ros.analysis import Recording
-from dmp_cpg_ros.analysis.recording import Series
+from dmp_cpg_ros.analysis.other_tables import OTHER_TABLES, other_tables
+from dmp_cpg_ros.analysis.recording import Series, StatusEvent
 from dmp_cpg_ros.commands.analyze import PARTLY, Progress, main
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
@@ -61,6 +64,7 @@ def test_tables_are_written_as_csv(bag: Path, tmp_path: Path) -> None:
     assert main([str(bag), '--no-pictures', '--out', str(tmp_path / 'out'), '--csv',
                  str(folder)]) == 0
     tables = Recording.load(bag).tables()
+    assert len(tables['inhibition']['message']) > 1
     assert {path.stem for path in folder.iterdir()} == set(tables)
     for name, columns in tables.items():
         with (folder / f'{name}.csv').open(encoding='utf-8', newline='') as file:
@@ -71,6 +75,85 @@ def test_tables_are_written_as_csv(bag: Path, tmp_path: Path) -> None:
                 assert list(of) == column
             else:
                 np.testing.assert_array_equal(np.array(of, dtype=float), column)
+
+
+def test_words_have_a_column_for_each_key_and_their_level() -> None:
+    said = ({'grade': 'holds, k=3', 'bound_s': '2.5'}, {'bound_s': 'nan', 'cause': 'fl'})
+    events = tuple(StatusEvent(float(k), k, 'waiting', of) for k, of in enumerate(said))
+    tables = Recording(inhibition=events, statuses={'robot': events, 'quiet': (
+        StatusEvent(4.0, 2, 'silent', {}),)}).tables()
+    inhibition, rows = tables['inhibition'], tables['statuses']
+    assert list(inhibition) == ['time_s', 'level', 'message', 'grade', 'bound_s', 'cause']
+    assert inhibition['level'].tolist() == [0, 1]
+    assert inhibition['grade'] == ['holds, k=3', ''] and inhibition['cause'] == ['', 'fl']
+    np.testing.assert_array_equal(inhibition['bound_s'], [2.5, np.nan])
+    assert list(zip(rows['name'], rows['level'].tolist(), rows['key'], rows['value'],
+                    strict=True)) == [
+        ('robot', 0, 'grade', 'holds, k=3'), ('robot', 0, 'bound_s', '2.5'),
+        ('robot', 1, 'bound_s', 'nan'), ('robot', 1, 'cause', 'fl'), ('quiet', 2, '', '')]
+
+
+def test_topics_that_no_metric_reads_are_tables_too(
+        bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def header(time: float = 0.0, frame: str = '') -> Any:
+        sec, nanosec = divmod(round(time * 1e9), 10**9)
+        return make('std_msgs/msg/Header', frame_id=frame,
+                    stamp=make('builtin_interfaces/msg/Time', sec=sec, nanosec=nanosec))
+
+    def rows(time: float, *names: str, **values: Any) -> Any:
+        return make('sensor_msgs/msg/JointState', header=header(time), name=list(names), **{
+            of: np.array(values.get(of, []), float) for of in ('position', 'velocity', 'effort')})
+
+    def vector(x: float, y: float, z: float) -> Any:
+        return make('geometry_msgs/msg/Vector3', x=x, y=y, z=z)
+
+    unknown = np.zeros(9)
+    felt = make('sensor_msgs/msg/Imu', header=header(0.02), orientation_covariance=unknown,
+                orientation=make('geometry_msgs/msg/Quaternion', x=0.0, y=0.0, z=0.0, w=1.0),
+                angular_velocity=vector(1.0, 2.0, 3.0), angular_velocity_covariance=unknown,
+                linear_acceleration=vector(4.0, 5.0, 9.8), linear_acceleration_covariance=unknown)
+    push = make('geometry_msgs/msg/WrenchStamped', header=header(777.0, 'odom'), wrench=make(
+        'geometry_msgs/msg/Wrench', force=vector(0.0, 60.0, 0.0), torque=vector(0.0, 0.0, 1.5)))
+    ticks = [(round(at * 1e9), 'joint_states', rows(at, 'fl_hip', position=[0.1]))
+             for at in (0.0, 0.02, 0.04)]
+    between = 25_000_000                              # after the second tick, by the record time
+    folder = tmp_path / 'bag'
+    with Writer(folder, version=9) as writer:
+        known: dict[str, Any] = {}
+        for at, topic, message in (
+                *ticks, (between, 'imu', felt), (between, 'push', push),
+                (between, 'drive_mode', make('std_msgs/msg/String', data='stand, then lie')),
+                (between, 'votes', rows(555.0, 'me/fl', 'me/rr', effort=[40.0, 20.0])),
+                (between, 'inhibition_gains', rows(
+                    0.02, 'fl', 'share', position=[400.0, 0.0], effort=[0.0, 0.0])),
+                (between, 'posture_feedback', rows(
+                    0.02, 'fl_hip', 'margin/front', position=[0.3, 0.1], velocity=[0.0, 0.0],
+                    effort=[7.0, 0.0]))):
+            if topic not in known:
+                known[topic] = writer.add_connection(f'/spot/{topic}', message.__msgtype__,
+                                                     typestore=STORE)
+            writer.write(known[topic], at, STORE.serialize_cdr(message, message.__msgtype__))
+    assert main([str(folder), '--no-pictures', '--out', str(tmp_path / 'out'), '--csv',
+                 str(tmp_path / 'tables')]) == 0
+    capsys.readouterr()
+    found = {}
+    for name in OTHER_TABLES:
+        text = (tmp_path / 'tables' / f'{name}.csv').read_text(encoding='utf-8')
+        found[name] = list(csv.DictReader(text.splitlines()))
+    assert found == {
+        'drive_mode': [{'time_s': '0.02', 'message': 'stand, then lie'}],
+        'imu': [{'time_s': '0.02', 'rate_x_rad_s': '1.0', 'rate_y_rad_s': '2.0',
+                 'rate_z_rad_s': '3.0', 'specific_force_x_m_s2': '4.0',
+                 'specific_force_y_m_s2': '5.0', 'specific_force_z_m_s2': '9.8'}],
+        'inhibition_gains': [{'time_s': '0.02', 'position_fl': '400.0', 'position_share': '0.0'}],
+        'posture_feedback': [{'time_s': '0.02', 'position_fl_hip': '0.3',
+                              'position_margin/front': '0.1', 'effort_fl_hip': '7.0'}],
+        'push': [{'time_s': '0.02', 'frame': 'odom', 'force_x_n': '0.0', 'force_y_n': '60.0',
+                  'force_z_n': '0.0', 'torque_x_n_m': '0.0', 'torque_y_n_m': '0.0',
+                  'torque_z_n_m': '1.5'}],
+        'votes': [{'time_s': '0.02', 'name': f'me/{leg}', 'weight_per_s': weight}
+                  for leg, weight in (('fl', '40.0'), ('rr', '20.0'))]}
+    assert not other_tables(bag, Recording.load(bag))
 
 
 def test_tables_are_written_as_parquet(bag: Path, tmp_path: Path) -> None:
