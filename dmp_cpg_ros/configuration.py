@@ -141,6 +141,25 @@ def writable(path: str | Path) -> Path:
     return Path(path)
 
 
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """File to write that takes the place of a path when it is whole; what is there stays until
+    then. What is no file, such as ``/dev/stdout``, is written itself; errors are as of
+    :func:`writable`.
+    """
+    path = writable(path)
+    if path.exists() and not path.is_file():
+        yield path
+        return
+    path = path.resolve()
+    new = path.with_name(f'.{os.getpid()}.{path.name}')  # its ending may say what it is to be
+    try:
+        yield new
+        os.replace(new, path)
+    finally:
+        new.unlink(missing_ok=True)
+
+
 def nearest(name: str, valid: Iterable[str]) -> str:
     """Question for an error whether a name that is near was meant; empty where none is."""
     near = get_close_matches(name, list(valid), n=1)

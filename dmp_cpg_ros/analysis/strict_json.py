@@ -7,14 +7,13 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import os
 from collections.abc import Mapping, Set
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.configuration import readable, writable
+from dmp_cpg_ros.configuration import readable, replacing
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 
 
@@ -43,17 +42,8 @@ def to_json(value: Any) -> str:
 def write_json(path: Path, value: Any) -> None:
     """Write strict JSON as UTF-8; a file that was there is replaced as a whole, or stays."""
     text = to_json(value)
-    path = writable(path)
-    if path.exists() and not path.is_file():  # such as /dev/stdout
-        path.write_text(text, encoding='utf-8')
-        return
-    path = path.resolve()
-    new = path.with_name(f'.{path.name}.{os.getpid()}')
-    try:
+    with replacing(path) as new:
         new.write_text(text, encoding='utf-8')
-        os.replace(new, path)
-    finally:
-        new.unlink(missing_ok=True)
 
 
 def read_json(path: Path) -> dict[str, Any]:

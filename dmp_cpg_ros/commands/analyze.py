@@ -10,7 +10,6 @@ import ctypes
 import logging
 import os
 import sys
-import time
 from collections.abc import Callable, Mapping, Sequence
 from itertools import count
 from pathlib import Path
@@ -32,6 +31,7 @@ from dmp_cpg_ros.analysis.tables import (
     write_csv,
     write_parquet,
 )
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT, RosArguments, one_line, run_command
 from dmp_cpg_ros.commands.run_folder import picture_taker, run_context, run_of
 from dmp_cpg_ros.configuration import naming, writable
@@ -211,28 +211,6 @@ def _tell_side_by_side(runs: Mapping[str, Mapping[str, Any]], out: Path | None) 
         out.mkdir(parents=True, exist_ok=True)
         writable(out / 'comparison.md').write_text(f'{table}\n', encoding='utf-8')
         write_json(out / 'comparison.json', runs)
-
-
-class Progress:
-    """Tells on stderr how far long work is: after some seconds, and not too often.
-
-    Parameters
-    ----------
-    of : str
-        What stands before.
-    """
-
-    SILENT_S, EVERY_S = 3.0, 5.0
-
-    def __init__(self, of: str = '') -> None:
-        """The work begins."""
-        self._of, self._next = of, time.monotonic() + self.SILENT_S
-
-    def __call__(self, text: str) -> None:
-        """Tell."""
-        if time.monotonic() >= self._next:
-            print(f'{self._of}{text}', file=sys.stderr, flush=True)
-            self._next = time.monotonic() + self.EVERY_S
 
 
 def print_facts(results: RunResults, lock_step: bool | None) -> None:

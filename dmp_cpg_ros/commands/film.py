@@ -22,6 +22,7 @@ from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import held, smoothed, velocity_in_heading
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.strict_json import read_json
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import (
     RosArguments,
     number,
@@ -30,7 +31,7 @@ from dmp_cpg_ros.commands.ros_arguments import (
     within,
 )
 from dmp_cpg_ros.commands.run_folder import run_context
-from dmp_cpg_ros.configuration import writable
+from dmp_cpg_ros.configuration import replacing, writable
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.robot.camera import Camera
 
@@ -76,7 +77,7 @@ class Shot:
 
 
 def film(recording: Recording, context: RunContext, robot_file: Path | None, path: Path,
-         shot: Shot | None = None) -> int:
+         shot: Shot | None = None, tell: Callable[[str], None] = lambda text: None) -> int:
     """Draw a recording and write it; returns the number of frames.
 
     Parameters
@@ -91,6 +92,8 @@ def film(recording: Recording, context: RunContext, robot_file: Path | None, pat
         ``.gif`` or ``.mp4``.
     shot : Shot, optional
         What to film; all of it without.
+    tell : callable (str), optional
+        Is told how far it is.
 
     Raises
     ------
@@ -115,8 +118,14 @@ def film(recording: Recording, context: RunContext, robot_file: Path | None, pat
     with Camera(robot_file, shot.width, shot.height, context.world, plain=True) as camera:
         draw = _painter(recording, camera, shot.height)
         sample = [draw(t) for t in np.linspace(first, last, min(PALETTE_FRAMES, len(times)))]
-        write_film(path, map(draw, times), sample, shot.fps)
+        write_film(path, _told(map(draw, times), len(times), tell), sample, shot.fps)
     return len(times)
+
+
+def _told(frames: Iterator[Frame], count: int, tell: Callable[[str], None]) -> Iterator[Frame]:
+    for drawn, frame in enumerate(frames, 1):
+        tell(f'drawing: {drawn} of {count} frames')
+        yield frame
 
 
 def _painter(recording: Recording, camera: Camera, height: int) -> Callable[[float], Frame]:
@@ -145,7 +154,8 @@ def _painter(recording: Recording, camera: Camera, height: int) -> Callable[[flo
     return draw
 
 
-def film_run(run: Path, path: Path, shot: Shot | None = None) -> int:
+def film_run(run: Path, path: Path, shot: Shot | None = None,
+             tell: Callable[[str], None] = lambda text: None) -> int:
     """Film a run's folder, with the robot and the world that its manifest names; see :func:`film`.
 
     Raises
@@ -155,8 +165,8 @@ def film_run(run: Path, path: Path, shot: Shot | None = None) -> int:
     """
     parameters = read_json(run / 'manifest.json').get('parameters')
     context, robot_file = run_context(parameters)
-    recording = load_recording(run, joint_names=context.joint_names)
-    return film(recording, context, robot_file, path, shot)
+    recording = load_recording(run, joint_names=context.joint_names, tell=tell)
+    return film(recording, context, robot_file, path, shot, tell)
 
 
 def has_encoder() -> bool:
@@ -183,7 +193,7 @@ def checked_film_path(path: Path) -> Path:
 
 
 def write_film(path: Path, frames: Iterator[Frame], palette_from: list[Frame], fps: float) -> None:
-    """Write frames as they come.
+    """Write frames as they come; the film is there when it is whole.
 
     Parameters
     ----------
@@ -197,23 +207,29 @@ def write_film(path: Path, frames: Iterator[Frame], palette_from: list[Frame], f
         Frames per second.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    first = next(frames)
-    frames = chain([first], frames)
-    if path.suffix.lower() == '.gif':
-        palette = Image.fromarray(np.concatenate(palette_from)).quantize(
-            COLOURS, Image.Quantize.MAXCOVERAGE)
-        pictures = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-                    for frame in frames)
-        next(pictures).save(path, save_all=True, append_images=pictures, loop=0,
-                            duration=max(round(1000.0 / fps), 20), optimize=False)
-        return
+    with replacing(path) as new:
+        (_write_gif if path.suffix.lower() == '.gif' else _write_mp4)(
+            new, frames, palette_from, fps)
+
+
+def _write_gif(path: Path, frames: Iterator[Frame], palette_from: list[Frame], fps: float) -> None:
+    palette = Image.fromarray(np.concatenate(palette_from)).quantize(
+        COLOURS, Image.Quantize.MAXCOVERAGE)
+    pictures = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+                for frame in frames)
+    next(pictures).save(path, save_all=True, append_images=pictures, loop=0,
+                        duration=max(round(1000.0 / fps), 20), optimize=False)
+
+
+def _write_mp4(path: Path, frames: Iterator[Frame], _: list[Frame], fps: float) -> None:
     import imageio_ffmpeg
 
+    first = next(frames)
     writer = imageio_ffmpeg.write_frames(
         str(path), first.shape[1::-1], fps=fps, quality=MP4_QUALITY, macro_block_size=2,
         ffmpeg_log_level='error')
     writer.send(None)
-    for frame in frames:
+    for frame in chain([first], frames):
         writer.send(np.ascontiguousarray(frame))
     writer.close()
 
@@ -240,7 +256,7 @@ def _film(options: argparse.Namespace, _: RosArguments) -> int:
     checked_film_path(options.film)
     height = 2 * round(options.width * 9 / 32)
     shot = Shot(options.start, options.end, options.fps, options.width, height)
-    frames = film_run(options.run, options.film, shot)
+    frames = film_run(options.run, options.film, shot, Progress())
     print(f'{options.film}: {frames} frames, {options.film.stat().st_size / 1e6:.2f} MB')
     return 0
 

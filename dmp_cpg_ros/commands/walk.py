@@ -246,6 +246,7 @@ def _analyze(plan: _Plan, folder: Path) -> int:
     """Write the run's folder and print what it says; returns the exit status."""
     # Late: figures and films cost a second of imports, which who is refused need not wait for.
     from dmp_cpg_ros.commands.analyze import analyze_run, print_facts
+    from dmp_cpg_ros.commands.progress import Progress
 
     lock_step = plan.options.lock_step
     try:
@@ -254,8 +255,7 @@ def _analyze(plan: _Plan, folder: Path) -> int:
             certificate=[entry.as_mapping() for entry in plan.certificate.inequalities],
             seeds={'robot': plan.suite.robot.seed}, lock_step=lock_step,
             report=not plan.options.no_report, scenario=plan.scenario.name,
-            **plan.failures(),
-            processes=plan.options.processes)
+            **plan.failures(), processes=plan.options.processes, tell=Progress())
     except (DmpCpgError, OSError) as error:  # such as a full disk
         print(f'walk: cannot analyze the recording: {error}', file=sys.stderr)
         return FAILED
@@ -268,10 +268,12 @@ def _analyze(plan: _Plan, folder: Path) -> int:
 def _film(folder: Path, given: str) -> None:
     """Film the run; one that cannot be drawn here is no failure of the run."""
     from dmp_cpg_ros.commands import film
+    from dmp_cpg_ros.commands.progress import Progress
 
     path = Path(given) if given else folder / f'walk.{"mp4" if film.has_encoder() else "gif"}'
     try:
-        print(f'video: {os.path.relpath(path)}, {film.film_run(folder, path)} frames')
+        frames = film.film_run(folder, path, tell=Progress('video: '))
+        print(f'video: {os.path.relpath(path)}, {frames} frames')
     except (DmpCpgError, OSError) as error:
         print(f'walk: no video: {error}', file=sys.stderr)
 

@@ -22,7 +22,8 @@ from synthetic_walk import SyntheticWalk
 from dmp_cpg_ros.analysis import Recording
 from dmp_cpg_ros.analysis.other_tables import OTHER_TABLES, other_tables
 from dmp_cpg_ros.analysis.recording import Series, StatusEvent
-from dmp_cpg_ros.commands.analyze import PARTLY, Progress, main
+from dmp_cpg_ros.commands.analyze import PARTLY, main
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
@@ -222,7 +223,7 @@ def test_a_run_that_cannot_be_used_is_named_and_the_others_are_compared(
 def test_progress_is_told_on_stderr(capsys: pytest.CaptureFixture[str],
                                     monkeypatch: pytest.MonkeyPatch) -> None:
     now = [0.0]
-    monkeypatch.setattr('dmp_cpg_ros.commands.analyze.time.monotonic', lambda: now[0])
+    monkeypatch.setattr('dmp_cpg_ros.commands.progress.time.monotonic', lambda: now[0])
     tell = Progress('monday: ')
     for now[0] in (1.0, 4.0, 8.5, 9.0):
         tell(f'reading {now[0]:g}')

@@ -76,6 +76,29 @@ def test_frames_arrive_in_order_and_in_colour(tmp_path):
     np.testing.assert_allclose([frame.mean(axis=(0, 1)) for frame in read], colours, atol=6)
 
 
+def test_a_film_that_is_interrupted_leaves_what_was_there(tmp_path):
+    path = tmp_path / 'film.gif'
+    path.write_bytes(b'an earlier film')
+    frame = np.full((48, 64, 3), 100, dtype=np.uint8)
+
+    def broken():
+        yield frame
+        yield frame
+        assert path.read_bytes() == b'an earlier film'
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_film(path, broken(), [frame], 5.0)
+    assert [of.name for of in tmp_path.iterdir()] == ['film.gif']
+    assert path.read_bytes() == b'an earlier film'
+
+
+def test_it_is_told_how_far_a_film_is(glide, tmp_path):
+    told = []
+    film(glide, RunContext(), None, tmp_path / 'glide.gif', SMALL, told.append)
+    assert told[0] == 'drawing: 1 of 7 frames' and told[-1] == 'drawing: 7 of 7 frames'
+
+
 @pytest.mark.skipif(not has_encoder(), reason='imageio-ffmpeg is not installed')
 def test_an_mp4_is_written_where_there_is_an_encoder(tmp_path):
     frames = [np.full((48, 64, 3), value, dtype=np.uint8) for value in (0, 120, 240)]

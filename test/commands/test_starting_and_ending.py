@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import termios
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -29,6 +30,7 @@ from dmp_cpg_ros.analysis.bag import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands import analyze
 from dmp_cpg_ros.commands import walk as walk_command
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import RosArguments
 from dmp_cpg_ros.commands.suite_domain import alone_in_domain
 from dmp_cpg_ros.configuration import find_config
@@ -347,20 +349,23 @@ def test_help_of_walk_lists_the_scenarios(processes: Processes) -> None:
     assert 'start_stop' in process.output and 'votes' in process.output
 
 
-def test_a_full_disk_during_the_report_ends_in_a_line_and_what_is_said_at_the_end(
+def test_a_report_says_how_far_it_is_and_a_full_disk_ends_it_in_a_line_before_what_is_said_last(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
         capsys: pytest.CaptureFixture[str]) -> None:
     def run(plan: Any, folder: Path, server: Any) -> tuple[int, list[str]]:
         (folder / 'bag').mkdir()
         return walk_command.OK, ['an event was refused']
 
-    def full(*_: Any, **__: Any) -> NoReturn:
+    def full(*_: Any, tell: Callable[[str], None], **__: Any) -> NoReturn:
+        tell('figures')
         raise OSError(errno.ENOSPC, 'No space left on device')
 
     monkeypatch.setattr(walk_command, '_run', run)
     monkeypatch.setattr(analyze, 'analyze_run', full)
+    monkeypatch.setattr(Progress, 'SILENT_S', 0.0)
     options = walk_command._parser().parse_args(['--out', str(tmp_path / 'run')])
     plan = walk_command._planned(options, RosArguments())
     assert walk_command._walk(plan, None) == walk_command.FAILED
     told = capsys.readouterr().err
+    assert told.startswith('figures\n')
     assert 'No space left on device' in told and 'walk: an event was refused' in told
