@@ -19,6 +19,7 @@ from math import ceil, exp, log, log2
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.core.canonical import coupling as graphs
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
@@ -102,7 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     print(f'rho = {RHO:g} 1/s, r = 1, omega = {OMEGA:g} rad/s, r0 = {REGION:g} where not said '
           'otherwise\n')
-    found = list(rows(options.graphs))
+    found = list(rows(options.graphs, Progress(every_s=10.0)))
     print(markdown_table(('condition', 'graph', 'quantity', 'certified', 'works', 'ratio'), [
         (row.condition, row.graph, row.quantity, f'{row.certified:.4g}', f'{row.works:.4g}',
          f'{row.ratio:.2f}') for row in found]), end='\n\n')
@@ -113,13 +114,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def rows(graphs: Sequence[str]) -> Iterator[Row]:
-    """All lines of the table for some graphs."""
-    for make in (synchronisation_row, capture_row, contraction_row,
-                 partial(contraction_row, omega=SLOW_OMEGA), partial(tube_row, omega=OMEGA),
-                 partial(tube_row, omega=SLOW_OMEGA), mismatch_row, vote_row, step_row,
-                 rest_row):
-        yield from map(make, graphs)
+def rows(graphs: Sequence[str], tell: Callable[[str], None] = lambda text: None
+         ) -> Iterator[Row]:
+    """All lines of the table for some graphs; how far it is is told."""
+    makers: tuple[Callable[[str], Row], ...] = (
+        synchronisation_row, capture_row, contraction_row,
+        partial(contraction_row, omega=SLOW_OMEGA), partial(tube_row, omega=OMEGA),
+        partial(tube_row, omega=SLOW_OMEGA), mismatch_row, vote_row, step_row, rest_row)
+    for number, (make, graph) in enumerate(product(makers, graphs), 1):
+        row = make(graph)
+        tell(f'row {number} of {len(makers) * len(graphs)}: {row.condition}, {graph}')
+        yield row
 
 
 def network(graph: str, coupling: float | None = None) -> CanonicalSystem:

@@ -20,6 +20,7 @@ from multiprocessing import get_context, parent_process
 from types import TracebackType
 from typing import Any, TypeVar
 
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.core.errors import DmpCpgError
 
 Case = TypeVar('Case')
@@ -27,6 +28,10 @@ Result = TypeVar('Result')
 
 CONNECTED_WITHIN_S = 10.0
 """How long the scheduler of a cluster may take to answer [s]."""
+
+
+SPARSE_S = 10.0
+"""How often is counted where there is no terminal [s]."""
 
 
 class Workers:
@@ -39,7 +44,8 @@ class Workers:
     cluster : str, optional
         Address of a cluster's scheduler, which is used instead.
     progress : bool, optional
-        Whether to count on standard error; without, where that is a terminal.
+        Whether to count on standard error; without, where that is a terminal, and on another
+        every ten seconds.
     prepare : callable, optional
         What every process of this machine does first.
 
@@ -53,7 +59,7 @@ class Workers:
     def __init__(self, number: int, cluster: str = '', progress: bool | None = None,
                  prepare: Callable[[], object] | None = None) -> None:
         self._number, self._cluster, self._prepare = number, cluster, prepare
-        self._progress = sys.stderr.isatty() if progress is None else progress
+        self._progress = progress
         self._pool: ProcessPoolExecutor | None = None
         self._client: Any = None
 
@@ -93,15 +99,28 @@ class Workers:
         else:
             futures = self._client.map(trial, cases, pure=False)
             results = (future.result() for future in futures)
+        tell = self._counter(len(cases))
         try:
             for count, result in enumerate(results, 1):
-                if self._progress:
-                    end = '\n' if count == len(cases) else ''
-                    print(f'\r{count}/{len(cases)} ', end=end, file=sys.stderr, flush=True)
+                tell(count)
                 yield result
         except BrokenProcessPool:
             raise DmpCpgError('a process of the study has ended before its case, killed perhaps '
                               'for want of memory') from None
+
+
+    def _counter(self, cases: int) -> Callable[[int], None]:
+        """Return what tells how many cases are done."""
+        sparse = Progress(every_s=SPARSE_S)
+
+        def count(done: int) -> None:
+            if self._progress or self._progress is None and sys.stderr.isatty():
+                print(f'\r{done}/{cases} ', end='\n' if done == cases else '', file=sys.stderr,
+                      flush=True)
+            elif self._progress is None:
+                sparse(f'{done}/{cases}')
+
+        return count
 
 
 def _begin(prepare: Callable[[], object] | None) -> None:

@@ -63,6 +63,15 @@ def test_progress_is_counted_where_it_is_wanted(capfd: pytest.CaptureFixture[str
         assert ('39/39' in capfd.readouterr().err) is progress
 
 
+def test_without_a_terminal_a_line_now_and_then_counts(
+        capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('dmp_cpg_ros.commands.progress.Progress.SILENT_S', 0.0)
+    with Workers(1) as workers:
+        list(workers.map(sqrt, CASES))
+    first, *others = capfd.readouterr().err.splitlines()
+    assert first == '1/39' and len(others) < len(CASES) - 1
+
+
 def test_a_cluster_without_its_library_says_what_to_install(
         monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, 'distributed', None)

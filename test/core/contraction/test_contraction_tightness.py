@@ -19,6 +19,12 @@ def test_thresholds_are_found_from_either_side() -> None:
     assert threshold(lambda x: x < 3.0, 40.0, 20.0) == pytest.approx(3.0, rel=0.011)
 
 
+def test_every_row_is_told_as_it_is_found() -> None:
+    told: list[str] = []
+    row = next(tightness.rows(['ring', 'path'], told.append))
+    assert told == [f'row 1 of 20: {row.condition}, ring']
+
+
 @pytest.mark.parametrize(('row', 'loosest'), [
     (tightness.synchronisation_row, 1.05), (tightness.capture_row, 1.15),
     (tightness.vote_row, 1.1)])
