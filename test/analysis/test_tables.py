@@ -232,14 +232,16 @@ def test_progress_is_told_on_stderr(capsys: pytest.CaptureFixture[str],
     assert not said.out
 
 
+@pytest.mark.parametrize('place', ['.', 'doc/notebooks'])
 def test_the_notebook_runs(bag: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                           capsys: pytest.CaptureFixture[str]) -> None:
+                           capsys: pytest.CaptureFixture[str], place: str) -> None:
     text = (ROOT / 'doc' / 'notebooks' / 'recording.ipynb').read_text(encoding='utf-8')
     cells = [cell for cell in json.loads(text)['cells'] if cell['cell_type'] == 'code']
     assert cells and not any(cell['outputs'] for cell in cells)
     (tmp_path / 'runs').mkdir()
     os.symlink(bag, tmp_path / 'runs' / 'latest')
-    monkeypatch.chdir(tmp_path)
+    (tmp_path / place).mkdir(parents=True, exist_ok=True)
+    monkeypatch.chdir(tmp_path / place)
     monkeypatch.setenv('MPLBACKEND', 'Agg')
     names: dict[str, object] = {}
     for cell in cells:
