@@ -233,7 +233,9 @@ class CommandWatchdog:
             return JointTargets(*self._going_on(now, np.array((position, velocity, effort))))
         if (self._return_ns and 0 < self._late_ns < now - self._timeout_ns
                 and self._elsewhere(now, position, velocity)):
-            return self._falling_back(state)
+            if now - self._late_ns > self._timeout_ns + self._return_ns:
+                return self._falling_back(state)
+            return JointTargets(*self._going_on(now, np.array((position, velocity, effort))))
         if self._late_ns:
             self._late_ns, self._taken_ns, self._off = 0, now, self._given - position
             self._taking_s = TAKEN_UP_S
