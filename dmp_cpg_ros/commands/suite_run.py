@@ -24,8 +24,9 @@ ENDED_WITHIN_S = 15.0
 
 
 def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: Path, say: Say,
-              server: ForkServer, *, lock_step: bool, processes: str, view: bool = False,
-              visualization: bool = False, respawn: bool = False) -> tuple[bool, list[str]]:
+              server: ForkServer, *, lock_step: bool, processes: str, stamped: bool = False,
+              view: bool = False, visualization: bool = False, respawn: bool = False
+              ) -> tuple[bool, list[str]]:
     """Run the suite from nothing to nothing.
 
     A walk goes on without its recorder, which says at once when it cannot write any more, and
@@ -49,6 +50,8 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
         Whether the robot waits for the targets of every tick.
     processes : str
         How nodes share processes, a key of :data:`~dmp_cpg_ros.suite_table.PROCESSES`.
+    stamped : bool
+        Whether the nodes read ``TwistStamped`` on ``cmd_vel``.
     view : bool
         Whether to serve a live view, whose end does not end the run.
     visualization : bool
@@ -87,7 +90,7 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
             group.start_nodes(shared, arguments)
             if not respawn:
                 server.close()
-            player = ScenarioPlayer(scenario, tick_ns, lock_step, say)
+            player = ScenarioPlayer(scenario, tick_ns, lock_step, say, stamped=stamped)
             executor = execution.make_executor('events')
             executor.add_node(player)
             watch = SuiteWatch(executor, player, group, interrupted, say, shared, respawn)

@@ -30,6 +30,7 @@ from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
 from dmp_cpg_ros.core.maths.rounding import no_less
 from dmp_cpg_ros.core.scenario.scenario import Scenario
+from dmp_cpg_ros.core.suite_parameters import REFERENCE
 from dmp_cpg_ros.primitive_files import motion_overrides
 from dmp_cpg_ros.suite import Suite, load_suite
 from dmp_cpg_ros.suite_table import (
@@ -222,7 +223,8 @@ def _run(plan: _Plan, folder: Path, server: ForkServer) -> tuple[int, list[str]]
         values.update(lock_step=options.lock_step, expected_nodes=list(RECORDED_WALK))
         if options.respawn and not options.lock_step:
             values.setdefault('return_time', RETURN_S)
-    resolved[RECORDER] = {'output': str(folder / 'bag'),
+    stamped = resolved[REFERENCE]['stamped_cmd_vel']
+    resolved[RECORDER] = {'output': str(folder / 'bag'), 'stamped_cmd_vel': stamped,
                           'expected_nodes': [kind.name for kind in WALKING]}
     rules = [*ros.remappings, *namespace_rules(ros.namespace)]
     file = run_folder.write_parameters(folder, resolved)
@@ -231,7 +233,7 @@ def _run(plan: _Plan, folder: Path, server: ForkServer) -> tuple[int, list[str]]
     try:
         whole, told = run_suite(
             plan.scenario, plan.suite.tick_ns, arguments, folder / 'logs', _say, server,
-            lock_step=options.lock_step, processes=options.processes,
+            lock_step=options.lock_step, processes=options.processes, stamped=stamped,
             view=options.view, visualization=options.visualization, respawn=options.respawn)
         return OK if whole else FAILED, told
     except InterruptedRunError as error:

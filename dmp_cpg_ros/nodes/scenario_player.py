@@ -12,7 +12,6 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Twist
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -33,7 +32,7 @@ from dmp_cpg_ros.nodes.framework.own_messages import OwnMessages
 from dmp_cpg_ros.nodes.framework.requests import ParameterSetter, ask
 from dmp_cpg_ros.nodes.messages.commands import push_force, twist
 from dmp_cpg_ros.nodes.messages.inhibition import read_state_word
-from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, interface
+from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, STAMPED_CMD_VEL, interface
 from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES, read_drive_mode
 from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
 from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamp_ns
@@ -71,6 +70,8 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         Whether the gate is held before every tick with an action; in real time it opens once.
     say : callable (time_s, text)
         Told what happens.
+    stamped : bool
+        Whether the suite runs with ``stamped_cmd_vel:=true``: ``TwistStamped``, not ``Twist``.
 
     Attributes
     ----------
@@ -91,7 +92,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
     """
 
     def __init__(self, scenario: Scenario, tick_ns: int, lock_step: bool,
-                 say: Callable[[float, str], None]) -> None:
+                 say: Callable[[float, str], None], *, stamped: bool = False) -> None:
         """Create the topics; nothing is sent before :meth:`begin`."""
         super().__init__('scenario_player')
         self._tick_ns, self._lock_step, self._say = tick_ns, lock_step, say
@@ -104,8 +105,9 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._lain: Future | None = None
         self.heard = OwnMessages(self, self._warn, lock_step=lock_step)
         voting = any(action.kind == 'votes' and action.value for action in self._actions)
-        self._topics = {name: AcknowledgedTopic(self, self.heard, name) for name in (
-            'cmd_vel', 'push', *(['votes'] if voting else []))}
+        self._velocity = STAMPED_CMD_VEL if stamped else interface('cmd_vel')
+        self._topics = {topic.name: AcknowledgedTopic(self, self.heard, topic) for topic in (
+            self._velocity, *map(interface, ['push', *(['votes'] if voting else [])]))}
         gate = interface(f'{GATE_OWNER}/advance_until')
         self._gate = self.create_publisher(Clock, gate.name, gate.publisher_qos)
         self._callees = {name: self.create_client(interface(name).type, name)
@@ -248,7 +250,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             self._hand_over(action)
 
     def _send(self, command: Command) -> None:
-        self._publish('cmd_vel', twist(Twist, command))
+        self._publish('cmd_vel', twist(self._velocity.type, command))
 
     def _push(self, push: Push) -> None:
         """Send the push's forces at once; the robot applies each at its stamp."""

@@ -82,6 +82,14 @@ events:
   - {at: 0.3, command: {v_x: 0.8}}
 """
 
+COMMANDED = """\
+name: commanded
+duration: 1.5
+events:
+  - {at: 0.2, inhibit: false}
+  - {at: 0.2, command: {v_x: 0.5, gamma: 0.1}}
+"""
+
 WITH_CONTACTS = {'contact_feedback': True}
 """All that listens to the feet."""
 
@@ -168,6 +176,23 @@ def test_nodes_let_targets_act_a_lead_after_their_stamp(
     np.testing.assert_array_equal(recording.targets.position,
                                   [tick.targets.position for tick in ticks])
     assert not np.array_equal(joints, [state.joint_position for state in at_once[:-1]])
+
+
+@pytest.mark.parametrize('in_file', [False, True])
+def test_a_suite_whose_commands_are_stamped_walks_as_another(
+    processes: Processes, tmp_path: Path, in_file: bool
+) -> None:
+    scenario, parameters = tmp_path / 'commanded.yaml', tmp_path / 'stamped.yaml'
+    scenario.write_text(COMMANDED, encoding='utf-8')
+    parameters.write_text('/**: {ros__parameters: {stamped_cmd_vel: true}}', encoding='utf-8')
+    given = (('--parameters', str(parameters)) if in_file else ('--set', 'stamped_cmd_vel:=true'))
+    run = processes.walked(scenario, tmp_path / 'run', '--lock-step', '--composed',
+                           '--rate', str(SHARED_HZ), *given)
+    recording, (_, ticks) = load_recording(run / 'bag'), plain_run(
+        scenario, control_rate=SHARED_HZ)
+    np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
+    np.testing.assert_array_equal(recording.reference.value, [tick.r for tick in ticks])
+    np.testing.assert_array_equal(np.unique(recording.commands.value, axis=0), [[0.5, 0.0, 0.1]])
 
 
 def test_nodes_answer_pushes_as_the_plain_loop_does(

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.nodes.framework.own_messages import OwnMessages
-from dmp_cpg_ros.nodes.messages.interfaces import interface, private
+from dmp_cpg_ros.nodes.messages.interfaces import Interface, private
 from dmp_cpg_ros.nodes.messages.values import read_counts
 
 
@@ -24,13 +24,13 @@ class AcknowledgedTopic:
         Who sends.
     heard : OwnMessages
         What it reads.
-    name : str
+    topic : Interface
         Topic whose readers tell of it on ``~/commands_taken``.
     """
 
-    def __init__(self, node: Node, heard: OwnMessages, name: str) -> None:
+    def __init__(self, node: Node, heard: OwnMessages, topic: Interface) -> None:
         """Create the publisher, and a subscription for each reader."""
-        topic, self._name = interface(name), name
+        self._name = topic.name
         self._publisher = node.create_publisher(topic.type, topic.name, topic.publisher_qos)
         self._sent, self._taken = 0, dict.fromkeys(topic.subscribers, 0.0)
         self._missed, self._last = dict.fromkeys(topic.subscribers, 0), list[Any]()
