@@ -31,7 +31,7 @@ PAGE = Path(__file__).resolve().parents[1] / 'page'
 """Folder with the files of the page."""
 
 FILES = {'/live.css': 'text/css', '/live.js': 'text/javascript', '/scene.js': 'text/javascript',
-         '/panels.js': 'text/javascript'}
+         '/panels.js': 'text/javascript', '/keys.js': 'text/javascript'}
 """Files that everybody may read, and their types."""
 
 PORT, PORTS = 8642, 20

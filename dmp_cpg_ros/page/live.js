@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: reads frames from the server, shows them, and sends commands.
 
+import { hear_keys } from '/keys.js';
 import { Footfalls, Oscillators, Speeds, drawStick, drawTimes } from '/panels.js';
 import { View } from '/scene.js';
 
@@ -220,25 +221,7 @@ for (const name of ['pointerup', 'pointercancel', 'lostpointercapture']) {
 find('hold').addEventListener('change', () => { if (!find('hold').checked) stick = [0, 0]; });
 find('aside').addEventListener('dblclick', () => { find('aside').value = 0; });
 
-const DRIVING = ['ArrowUp', 'ArrowDown', 'ArrowLeft', 'ArrowRight', 'w', 'a', 's', 'd', 'q', 'e'];
-/** Name of a key: that of a letter does not depend on Shift and Caps Lock. */
-const key_of = (event) => (event.key.length === 1 ? event.key.toLowerCase() : event.key);
-window.addEventListener('keydown', (event) => {
-  if (event.target.type === 'range' || event.ctrlKey || event.metaKey || event.altKey) return;
-  if (DRIVING.includes(key_of(event))) {
-    keys.add(key_of(event));
-    event.preventDefault();
-  } else if (event.key === ' ' && event.target.tagName !== 'BUTTON' && event.target.tagName !== 'INPUT') {
-    find('inhibit').click();
-    event.preventDefault();
-  }
-});
-window.addEventListener('keyup', (event) => {
-  // Of a key that is released while Meta is held a Mac tells nothing.
-  if (event.key === 'Meta') keys.clear();
-  keys.delete(key_of(event));
-});
-window.addEventListener('blur', () => keys.clear());
+hear_keys(window, keys, () => find('inhibit').click());
 document.addEventListener('visibilitychange', () => { if (document.hidden) let_go(); });
 
 // --- buttons -----------------------------------------------------------------------------------------

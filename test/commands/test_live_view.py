@@ -394,6 +394,23 @@ def test_a_key_that_is_released_with_shift_or_meta_drives_no_more(
     assert not page.problems
 
 
+@pytest.mark.parametrize('touched', ['#resume', '#top', '#hold'])
+def test_the_space_bar_stops_the_robot_whatever_was_clicked_before(
+        client: Client, page: Page, touched: str) -> None:
+    at_rest(client)
+    page.open(client.address, 900, 640)
+    page.until(state('at rest'))
+    assert client.send(inhibit=False)[0]
+    client.until(lambda frame: not frame['requested'])
+    page.click(touched)
+    page.evaluate(f"document.querySelector('{touched}').focus()")  # as by the tabulator
+    page.key('keyDown', ' ')
+    page.key('keyUp', ' ')
+    frame = client.until(lambda frame: frame['requested'] and frame['stop'].get('automatic')
+                         == 'false' and frame['stop']['state'] == 'at_rest')
+    assert frame['requested'] and not page.problems
+
+
 def test_a_gamepad_drives_and_stops_the_robot(client: Client, page: Page, ros: Ros) -> None:
     at_rest(client)
     references = heard(ros, 'reference')
