@@ -145,8 +145,13 @@ def _timing(timing: Mapping[str, Any], lock_step: bool | None) -> list[Fact]:
 def _certificate(metrics: Mapping[str, Any]) -> list[Fact]:
     holds = [bool(entry['holds']) for entry in metrics['certificate'] or []
              if isinstance(entry, dict) and 'holds' in entry and entry.get('required', True)]
-    return _if_known(sum(holds) if holds else None, 'The certificate of the running parameters '
-                     'holds', f'{{}} of {len(holds)} required inequalities', all(holds))
+    return [
+        *_if_known(sum(holds) if holds else None,
+                   'The certificate of the parameters at the start holds',
+                   f'{{}} of {len(holds)} required inequalities', all(holds)),
+        *_if_known(metrics['gait']['certificate_lost_s'],
+                   'The certificate held whatever was changed', 'it failed from {:.2f} s on',
+                   holds=False)]
 
 
 def _known(entries: list[dict[str, Any]], *keys: str) -> list[tuple[Any, ...]]:

@@ -310,7 +310,7 @@ def test_labels_have_units() -> None:
 def test_facts_do_not_hold_when_the_run_was_bad(walked: Recording, context: RunContext) -> None:
     metrics = compute_metrics(walked, context, [{'name': 'a', 'holds': False}])
     good = {fact.statement for fact in facts(metrics) if fact.holds is False}
-    assert good == {'The certificate of the running parameters holds'}
+    assert good == {'The certificate of the parameters at the start holds'}
     metrics['robot']['fell'] = True
     metrics['tracking']['v_error_max'] = 0.2
     metrics['stop']['all'][0] |= {
@@ -322,6 +322,28 @@ def test_facts_do_not_hold_when_the_run_was_bad(walked: Recording, context: RunC
     metrics['timing']['real_time_factor'] = 0.5
     assert sum(fact.holds is False for fact in facts(metrics, lock_step=False)) == 7
     assert sum(fact.holds is False for fact in facts(metrics, lock_step=True)) == 6
+
+
+@pytest.mark.parametrize(('told', 'lost'), [
+    ('true true true', None), ('false false true', None), ('true false true', '9.00 s'),
+    ('false true false', '9.80 s'), ('- true false', '9.80 s')])
+def test_a_certificate_that_a_change_has_cost_is_told_with_its_time(
+        walked: Recording, context: RunContext, told: str, lost: str | None) -> None:
+    """A recording may begin without a certificate, as with ``allow_uncertified``."""
+    words = dict(zip((0.0, WALK.stop_s, WALK.stop_s + WALK.time_to_rest_s), told.split(),
+                     strict=True))
+    events = tuple(
+        dataclasses.replace(event, values={
+            **event.values, **({} if words[event.time] == '-' else {
+                'certified': words[event.time]})})
+        for event in walked.inhibition if event.time in words)
+    changed = dataclasses.replace(walked, inhibition=events)
+    found = {fact.statement: fact for fact in facts(compute_metrics(
+        changed, context, CERTIFICATE))}
+    assert found['The certificate of the parameters at the start holds'].holds
+    fact = found.get('The certificate held whatever was changed')
+    assert (fact is None) == (lost is None)
+    assert fact is None or (fact.holds, fact.finding) == (False, f'it failed from {lost} on')
 
 
 def test_the_command_needs_a_bag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -68,6 +68,8 @@ DEFINITIONS: dict[str, tuple[str, str]] = {
     'gait.duty_factor_of_leg.rr': ('', 'of the rear right foot'),
     'gait.duty_factor_planned': ('', 'what the gait plans at the same speeds'),
     'gait.period_s': ('s', 'median duration of a gait cycle'),
+    'gait.certificate_lost_s': ('s',
+        'when a change of gait or parameters first left them without the certificate they had'),
     'stop.predicted_s': ('s', 'time to rest as predicted at the request; of the slowest stop'),
     'stop.bound_s': ('s', 'guaranteed bound on it'),
     'stop.measured_s': ('s', 'time to rest as measured'),

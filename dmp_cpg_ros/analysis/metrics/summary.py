@@ -9,6 +9,7 @@ predicted, bounded and measured, and what the body did.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -127,7 +128,8 @@ def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
         ``phase_error_rad_max``, the largest deviation of a leg from its place in the gait while
         walking freely and settled; ``duty_factor``, the measured share of the cycle on the ground,
         mean of the legs, with ``duty_factor_of_leg`` and the planned ``duty_factor_planned``;
-        ``period_s``, the median gait cycle.
+        ``period_s``, the median gait cycle; ``certificate_lost_s``, when a change of gait or
+        parameters first left them without the certificate that they had.
     """
     time, errors = phase_errors(recording, context)
     settled = np.abs(errors[settled_rows(recording, time)])
@@ -142,7 +144,16 @@ def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
         'duty_factor_of_leg':
             None if duty is None else dict(zip(LEGS, duty.tolist(), strict=True)),
         'duty_factor_planned': planned_duty_factor(recording, context),
-        'period_s': episodes.gait_period(recording)}
+        'period_s': episodes.gait_period(recording),
+        'certificate_lost_s': _certificate_lost(recording.inhibition)}
+
+
+def _certificate_lost(events: Sequence[StatusEvent]) -> float | None:
+    """Time at which the inhibition first said that the certificate fails which had held [s]."""
+    told = [event for event in events if 'certified' in event.values]
+    return next((after.time for before, after in pairwise(told)
+                 if (before.values['certified'], after.values['certified']) == ('true', 'false')),
+                None)
 
 
 def phase_errors(recording: Recording, context: RunContext) -> tuple[Array, Array]:
