@@ -48,6 +48,10 @@ INSTALL, INSTALL_BESIDE = 'pip install', 'pip install --user --break-system-pack
 WITHOUT_ROS = ("{} needs ROS 2 Jazzy, which this Python ({}) does not find: source it, or "
                "pip install 'dmp_cpg_ros[ros]' (x86-64, Python 3.10 to 3.13)")
 
+OTHER_ROS = ("{} cannot import the rclpy of '{}' with this Python ({}): a sourced ROS 2 comes "
+             "before the environment's packages: use a terminal where none is sourced, or unset "
+             "PYTHONPATH, or that ROS 2's own Python")
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run ``dmp_cpg_ros [NAME ...]``; returns the exit status."""
@@ -89,17 +93,33 @@ def run(name: str) -> int:
         return int(module.run_node(name) if _folder(name) == 'nodes' else module.main())
     except KeyboardInterrupt:
         return INTERRUPTED
-    except ModuleNotFoundError as error:
-        missing = str(error.name).partition('.')[0]
-        if missing not in ON_THE_INDEX and (
-                missing == PACKAGE or find_spec('rclpy') is not None):
+    except ImportError as error:
+        text = _lacking(name, error)
+        if not text:
             raise
-        wanted = [index for module, index in ON_THE_INDEX.items() if find_spec(module) is None]
-        text = WITHOUT_ROS.format(name, sys.executable) if missing not in ON_THE_INDEX else (
-            WITHOUT_REQUIREMENT.format(name, sys.executable, INSTALL_BESIDE if _of_distribution()
-                                       else INSTALL, ' '.join(wanted)))
         print(f'dmp_cpg_ros: {text}', file=sys.stderr)
         return BAD_INPUT
+
+
+def _lacking(name: str, error: ImportError) -> str:
+    """What an executable cannot import and what to do, in a line; empty for its own errors."""
+    missing = str(error.name).partition('.')[0] if isinstance(error, ModuleNotFoundError) else ''
+    if missing in ON_THE_INDEX:
+        wanted = [index for module, index in ON_THE_INDEX.items() if find_spec(module) is None]
+        return WITHOUT_REQUIREMENT.format(
+            name, sys.executable, INSTALL_BESIDE if _of_distribution() else INSTALL,
+            ' '.join(wanted))
+    ros = find_spec('rclpy')
+    if ros is None:
+        return WITHOUT_ROS.format(name, sys.executable) if missing not in ('', PACKAGE) else ''
+    folder = Path(ros.origin or '').parent
+    if Path(sys.prefix) in folder.parents:
+        return ''
+    try:
+        import_module('rclpy')
+    except ImportError:
+        return OTHER_ROS.format(name, folder, sys.executable)
+    return ''
 
 
 def _of_distribution() -> bool:

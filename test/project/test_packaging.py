@@ -222,6 +222,26 @@ def test_who_has_no_ros_is_told_what_to_install(tmp_path: Path) -> None:
     assert done.stderr.count('\n') == 1 and not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize('words', [['robot_client', 'resume'], ['walk', 'amble_60'],
+                                   ['mujoco_robot', '--help']])
+@pytest.mark.parametrize('failure', [
+    "ImportError('no _rclpy_pybind11', name='rclpy._rclpy_pybind11')",
+    "ModuleNotFoundError('no _rclpy_pybind11', name='rclpy._rclpy_pybind11')"])
+def test_a_sourced_ros_of_another_python_is_named_in_one_line(
+        tmp_path: Path, words: list[str], failure: str) -> None:
+    rclpy = tmp_path / 'ros' / 'rclpy'
+    rclpy.mkdir(parents=True)
+    (rclpy / '__init__.py').write_text(f'raise {failure}', encoding='utf-8')
+    paths = os.pathsep.join([str(rclpy.parent), str(ROOT)])
+    done = subprocess.run([sys.executable, '-m', PACKAGE, *words], capture_output=True, text=True,
+                          timeout=60, check=False, cwd=tmp_path,
+                          env={**os.environ, 'PYTHONPATH': paths})
+    assert done.returncode == 2 and done.stderr.count('\n') == 1, done.stderr
+    assert "a sourced ROS 2 comes before the environment's packages: " in done.stderr
+    assert str(rclpy) in done.stderr and 'unset PYTHONPATH' in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ['ros']
+
+
 # --- what is installed ----------------------------------------------------------------------
 
 
