@@ -46,7 +46,7 @@ INSTALL, INSTALL_BESIDE = 'pip install', 'pip install --user --break-system-pack
 """How to install it: where the packages are a distribution's, pip refuses the usual way."""
 
 WITHOUT_ROS = ("{} needs ROS 2 Jazzy, which this Python ({}) does not find: source it, or "
-               "pip install 'dmp_cpg_ros[ros]' (x86-64, Python 3.10 to 3.13)")
+               "pip install 'WHEEL[ros]', the wheel of this package (x86-64, Python 3.10 to 3.13)")
 
 OTHER_ROS = ("{} cannot import the rclpy of '{}' with this Python ({}): a sourced ROS 2 comes "
              "before the environment's packages: use a terminal where none is sourced, or unset "

@@ -39,8 +39,7 @@ def write_parquet(tables: Tables, folder: Path) -> None:
     try:
         from pyarrow import parquet, table
     except ImportError as error:
-        raise MissingFileError(
-            "Parquet needs the package pyarrow: pip install 'dmp_cpg_ros[parquet]'") from error
+        raise MissingFileError('Parquet needs the package pyarrow: pip install pyarrow') from error
     folder.mkdir(parents=True, exist_ok=True)
     for name, columns in tables.items():
         parquet.write_table(table(dict(columns)), writable(folder / f'{name}.parquet'))

@@ -233,8 +233,7 @@ def network_of(path: str) -> Callable[[Array], Array]:
     try:
         import onnxruntime
     except ImportError:
-        raise DmpCpgError(
-            "a policy needs onnxruntime: pip install 'dmp_cpg_ros[policy]'") from None
+        raise DmpCpgError('a policy needs onnxruntime: pip install onnxruntime') from None
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4  # what it has to say comes as an exception

@@ -44,7 +44,7 @@ def parser_of(name: str, description: str | None, written: str, *, jobs: bool = 
         parser.add_argument(
             '--cluster', default='', metavar='ADDRESS',
             help='of the scheduler of a dask.distributed cluster, such as tcp://HOST:8786, whose '
-            "workers have this package; needs pip install 'dmp_cpg_ros[cluster]'")
+            'workers have this package; needs pip install distributed')
     if logs:
         parser.add_argument('--logs', type=Path, metavar='FOLDER',
                             help='where to keep what the processes say')

