@@ -17,7 +17,8 @@ from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.certificates.gate import Change, Running
 from dmp_cpg_ros.core.clock import TickClock
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState, estimated_state
+from dmp_cpg_ros.core.estimation.body_estimate import estimated_state
+from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
 from dmp_cpg_ros.core.estimation.parameters import ESTIMATE
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits, quarter_weight
 from dmp_cpg_ros.core.gait.gait import Gait

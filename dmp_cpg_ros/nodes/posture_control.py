@@ -12,12 +12,8 @@ import numpy as np
 from std_msgs.msg import String
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
-from dmp_cpg_ros.core.estimation.estimator import (
-    BodyEstimate,
-    BodyEstimator,
-    EstimatorState,
-    estimated_state,
-)
+from dmp_cpg_ros.core.estimation.body_estimate import BodyEstimate, estimated_state
+from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
 from dmp_cpg_ros.core.estimation.parameters import (
     ESTIMATE,
     EstimationParameters,

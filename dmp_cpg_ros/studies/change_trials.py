@@ -12,7 +12,7 @@ from math import ceil, isnan, nan
 import numpy as np
 
 from dmp_cpg_ros.analysis.motion import tilt
-from dmp_cpg_ros.core.estimation.estimator import estimated_state
+from dmp_cpg_ros.core.estimation.body_estimate import estimated_state
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.studies.walking_trials import Walk, attitude

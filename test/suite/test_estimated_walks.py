@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from core_examples import GAITS, TICK, suite_parameters
 
-from dmp_cpg_ros.core.estimation.estimator import BodyEstimate
+from dmp_cpg_ros.core.estimation.body_estimate import BodyEstimate
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw
 from dmp_cpg_ros.core.robot_model.grounds import Slope
@@ -116,6 +116,24 @@ def test_the_filter_is_not_surer_than_it_may_be() -> None:
     begin = round(STAND / TICK)
     variance = np.array([e.velocity_variance for e in walked('trot', (0.5,)).estimates])
     assert (velocity[begin:] ** 2).mean() < variance[begin:].mean()
+
+
+@pytest.mark.parametrize(('gait', 'command'), CASES)
+def test_what_odometry_tells_of_its_errors_is_no_less_than_they_are(
+        gait: str, command: tuple[float, ...]) -> None:
+    states, estimates = walked(gait, command).states, walked(gait, command).estimates
+    _, angles, _ = walked(gait, command).errors()
+    last, first = states[-1].base_position_in_world, states[0].base_position_in_world
+    begun = estimates[0].position_in_world
+    way = estimates[-1].position_in_world - begun - (last - first)
+    assert (way**2 < estimates[-1].position_variance).all()
+    assert estimates[-1].way > 0.9 * np.linalg.norm(last - first)
+    variance = np.array([estimate.attitude_variance for estimate in estimates])
+    assert ((angles**2).mean(axis=0) < variance.mean(axis=0)).all()
+    turning = np.array([estimate.rate_in_base - state.base_rate_in_base
+                        for state, estimate in zip(states, estimates, strict=True)])
+    variance = np.array([estimate.rate_variance for estimate in estimates])
+    assert ((turning**2).mean(axis=0) < variance.mean(axis=0)).all()
 
 
 def test_noise_follows_its_parameters() -> None:

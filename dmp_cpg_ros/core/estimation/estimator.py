@@ -17,12 +17,13 @@ judged by its joint torques, and without IMU the standing feet tell how the body
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import exp, isfinite
+from math import exp, hypot, isfinite
 
 import numpy as np
 
 from dmp_cpg_ros.core.clock import time_step
 from dmp_cpg_ros.core.estimation import frozen, leg_odometry, mid_stride, velocity_filter
+from dmp_cpg_ros.core.estimation.body_estimate import BodyEstimate
 from dmp_cpg_ros.core.estimation.leg_odometry import FootMotion, TerrainState, normal_in_world
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.estimation.velocity_filter import FilterState
@@ -33,61 +34,7 @@ from dmp_cpg_ros.core.maths.rotations import levelled
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
-from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
-
-
-@dataclass(frozen=True)
-class BodyEstimate:
-    """The body's state as far as the sensors tell it.
-
-    Attributes
-    ----------
-    time_ns : int
-        Stamp [ns].
-    position_in_world : ndarray (3,)
-        By leg odometry, from where the robot was switched on; z over the ground there [m].
-    quaternion : ndarray (4,)
-        Orientation of ``base_link``, x, y, z, w; yaw is 0 where the robot was switched on.
-    velocity_in_base, rate_in_base : ndarray (3,)
-        [m/s], [rad/s]
-    height : float
-        Of ``base_link`` over the ground under the stance feet, along its normal [m].
-    normal_in_world : ndarray (3,)
-        Of the ground's plane, upwards.
-    trust : ndarray (4,)
-        How well each foot stands, in [0, 1].
-    velocity_variance : ndarray (3,)
-        Of ``velocity_in_base``, as the filter believes [m^2/s^2].
-    problems : tuple of str
-        Sensors that could not be used at this tick.
-    readings : SensorReadings, optional
-        Where there are any: the readings without those of the sensors that failed, whose joints
-        keep their last angles.
-    """
-
-    time_ns: int
-    position_in_world: Array
-    quaternion: Array
-    velocity_in_base: Array
-    rate_in_base: Array
-    height: float
-    normal_in_world: Array
-    trust: Array
-    velocity_variance: Array
-    problems: tuple[str, ...] = ()
-    readings: SensorReadings | None = None
-
-
-def estimated_state(readings: SensorReadings, estimate: BodyEstimate) -> RobotState:
-    """Robot's state with an estimate in place of the ground truth, for the controllers."""
-    readings = estimate.readings or readings
-    felt = None if all(readings.usable_legs) else readings.usable_legs
-    return RobotState(
-        readings.time_ns, readings.joint_position, readings.joint_velocity, readings.joint_effort,
-        estimate.position_in_world, estimate.quaternion, estimate.velocity_in_base,
-        estimate.rate_in_base, readings.specific_force_in_base, readings.foot_force,
-        readings.rate_in_base, estimate.normal_in_world, felt_legs=felt)
-
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 BLIND = 0.02
 """Time for which the last turn rate is held without IMU and feet [s]; then the body counts as not
@@ -212,7 +159,8 @@ class BodyEstimator:
         if not isfinite(covariance.dot(covariance) + velocity.dot(velocity)):
             problems, state = (*problems, 'filter'), memory.filter
         terrain, estimate = self._finished(
-            memory, state, readings.time_ns, rate, motion, trust, problems)
+            memory, state, readings.time_ns, rate, noise.gyro_noise**2 / dt, motion, trust,
+            problems)
         if problems:
             estimate = replace_unchecked(estimate, readings=frozen.with_joints(watch, readings))
         return EstimatorState(state, terrain, estimate, rate, blind, still, watch), estimate
@@ -241,8 +189,8 @@ class BodyEstimator:
         estimate = BodyEstimate(
             readings.time_ns, np.array((0.0, 0.0, height)), state.quaternion,
             state.velocity_in_base, rate, height,
-            np.array(normal_in_world(flat.slope)), np.array(trust), covariance.diagonal()[3:6],
-            _problems(readings))
+            np.array(normal_in_world(flat.slope)), np.array(trust), covariance,
+            self.parameters.gyro_noise**2 / BLIND, 0.0, _problems(readings))
         feet = tuple((x, y, z + height if stand else 0.0)
                      for (x, y, z), stand in zip(contact, stands, strict=True))
         terrain = TerrainState(feet, leg_odometry.fitted_slope(feet)) if all(legs) else flat
@@ -292,7 +240,7 @@ class BodyEstimator:
 
     def _finished(
         self, memory: EstimatorState, state: FilterState, time_ns: int, rate: Array,
-        motion: FootMotion, trust: list[float], problems: tuple[str, ...],
+        rate_noise: float, motion: FootMotion, trust: list[float], problems: tuple[str, ...],
     ) -> tuple[TerrainState, BodyEstimate]:
         """Integrate the position, follow the ground, and put the estimate together."""
         last = memory.estimate
@@ -317,7 +265,7 @@ class BodyEstimator:
         return terrain, BodyEstimate(
             time_ns, np.array(position), state.quaternion, state.velocity_in_base,
             rate - state.gyro_bias, height, np.array(normal), np.array(trust),
-            state.covariance.diagonal()[3:6], problems)
+            state.covariance, rate_noise, last.way + hypot(*velocity) * dt, problems)
 
 
 def _is_still(readings: SensorReadings, state: FilterState) -> bool:

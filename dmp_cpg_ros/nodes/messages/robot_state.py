@@ -14,7 +14,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.estimation.estimator import BodyEstimate
+from dmp_cpg_ros.core.estimation.body_estimate import BodyEstimate
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, RobotState
 from dmp_cpg_ros.layouts import work_rows
 from dmp_cpg_ros.nodes.messages import cdr
@@ -109,26 +109,29 @@ class OdometryWriter:
     def __init__(self, frame: str = ODOM_FRAME) -> None:
         """Lay the message out."""
         self._message = cdr.RefilledMessage(frame, BASE_FRAME)
-        self._message.refilled(position=3, quaternion=4)
-        self._message.constant(*[0.0] * 36)
-        self._message.refilled(velocity=3, rate=3, covariance=36)
-        self._covariance = np.zeros(36)
+        self._message.refilled(position=3, quaternion=4, pose_covariance=36)
+        self._message.refilled(velocity=3, rate=3, twist_covariance=36)
+        self._pose, self._twist = np.zeros(36), np.zeros(36)
 
     def fill(self, time_ns: int, position: Array, quaternion: Array, velocity: Array,
-             rate: Array, velocity_variance: Array | float = 0.0) -> cdr.SerializedOdometry:
+             rate: Array) -> cdr.SerializedOdometry:
         """Refill with position [m], quaternion x, y, z, w, velocity [m/s] and turn rate [rad/s] in
-        the base's frame, and with the variances of the velocity [m²/s²], or what a message holds
-        at most: nothing may be known for long.
+        the base's frame.
         """
-        self._covariance[:15:7] = np.minimum(velocity_variance, LARGEST)
         return cdr.SerializedOdometry(self._message.filled(
-            time_ns, position, quaternion, velocity, rate, self._covariance))
+            time_ns, position, quaternion, self._pose, velocity, rate, self._twist))
 
     def fill_estimate(self, estimate: BodyEstimate) -> cdr.SerializedOdometry:
-        """Refill with an estimate; of the covariances only the velocity's variances are known."""
+        """Refill with an estimate and its variances, or what a message holds at most: nothing may
+        be known for long.
+        """
+        for diagonal, variances in (
+                (self._pose[::7], (estimate.position_variance, estimate.attitude_variance)),
+                (self._twist[::7], (estimate.velocity_variance, estimate.rate_variance))):
+            np.minimum(np.concatenate(variances), LARGEST, out=diagonal)
         return self.fill(
             estimate.time_ns, estimate.position_in_world, estimate.quaternion,
-            estimate.velocity_in_base, estimate.rate_in_base, estimate.velocity_variance)
+            estimate.velocity_in_base, estimate.rate_in_base)
 
 
 class JointsReader:

@@ -12,7 +12,8 @@ import pytest
 from body_motions import SWAY, Sway, point_footed, readings
 from core_examples import GRAVITY, TICK
 
-from dmp_cpg_ros.core.estimation.estimator import BodyEstimate, BodyEstimator, EstimatorState
+from dmp_cpg_ros.core.estimation.body_estimate import BodyEstimate
+from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw, turned
 from dmp_cpg_ros.core.maths.vec3 import rotation

@@ -92,9 +92,29 @@ def test_the_estimate_passes_bit_for_bit() -> None:
     assert np.array_equal(read.quaternion, estimate.quaternion)
     assert np.array_equal(read.velocity_in_base, estimate.velocity_in_base)
     assert np.array_equal(read.rate_in_base, estimate.rate_in_base)
-    covariance = np.reshape(message.twist.covariance, (6, 6))
-    assert np.array_equal(covariance.diagonal()[:3], estimate.velocity_variance)
-    assert covariance.sum() == pytest.approx(estimate.velocity_variance.sum())
+    for told, variances in (
+            (message.pose.covariance, (estimate.position_variance, estimate.attitude_variance)),
+            (message.twist.covariance, (estimate.velocity_variance, estimate.rate_variance))):
+        assert np.array_equal(np.reshape(told, (6, 6)), np.diag(np.concatenate(variances)))
+    truth = RobotStateWriter()
+    truth.fill(standing_state(robot))
+    assert not wire(truth.ground_truth).pose.covariance.any()
+
+
+def test_what_the_sensors_tell_less_of_is_told_with_a_larger_variance() -> None:
+    robot = quadruped()
+    estimator = BodyEstimator(robot, EstimationParameters())
+    memory, begun = estimator.step(None, readings_of(standing_state(robot)))
+    for k in range(1, 5000):
+        memory, estimate = estimator.step(
+            memory, readings_of(standing_state(robot, k * 4_000_000)))
+    roll, pitch, yaw = estimate.attitude_variance
+    assert 0.0 < max(roll, pitch) < begun.attitude_variance[:2].min()
+    assert yaw > begun.attitude_variance[2]            # nothing tells it
+    assert (estimate.rate_variance > 0.0).all()
+    memory = replace(memory, estimate=replace(estimate, velocity_in_base=np.array((1.0, 0, 0))))
+    _, walked = estimator.step(memory, readings_of(standing_state(robot, 5000 * 4_000_000)))
+    assert (walked.position_variance > estimate.position_variance).all()
 
 
 def test_a_robot_that_has_felt_nothing_for_minutes_tells_that_it_knows_nothing() -> None:
