@@ -58,7 +58,10 @@ def reach(topic: str, fields: str) -> Any:
 def test_rviz_shows_topics_of_the_right_types_in_frames_that_there_are() -> None:
     manager = yaml.safe_load(RVIZ.read_text('utf-8'))['Visualization Manager']
     shown = {}
-    for display in manager['Displays']:
+    displays = {display['Class'].rpartition('/')[2]: display for display in manager['Displays']}
+    nav2_map = displays.pop('Map')['Topic']
+    assert (nav2_map['Value'], nav2_map['Durability Policy']) == ('/map', 'Transient Local')
+    for display in displays.values():
         kind = display['Class'].rpartition('/')[2]
         for key in ('Topic', 'Description Topic'):
             if key in display:
@@ -70,6 +73,16 @@ def test_rviz_shows_topics_of_the_right_types_in_frames_that_there_are() -> None
     assert set(shown['MarkerArray']['Namespaces']) == {FEET, FORCES, PATHS, FOOTHOLDS}
     assert manager['Global Options']['Fixed Frame'] == ODOM_FRAME
     assert manager['Views']['Current']['Target Frame'] == BASE_FRAME
+
+
+def test_rviz_sets_the_pose_and_the_goal_of_nav2() -> None:
+    manager = yaml.safe_load(RVIZ.read_text('utf-8'))['Visualization Manager']
+    assert {tool['Class'].rpartition('/')[2]: tool['Topic']['Value']
+            for tool in manager['Tools'] if 'Topic' in tool} == {
+        'SetInitialPose': '/initialpose', 'SetGoal': '/goal_pose'}
+    text = (ROOT / 'doc' / 'how_to' / 'nav2.md').read_text('utf-8')
+    assert 'ros2 topic pub --once /initialpose ' in text
+    assert RVIZ.relative_to(ROOT).as_posix() in text
 
 
 def test_foxglove_shows_topics_and_fields_that_there_are() -> None:
