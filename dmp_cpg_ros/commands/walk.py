@@ -99,10 +99,12 @@ def _main(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> int:
 
 def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _Plan:
     """Read everything; raises DmpCpgError for what cannot be run."""
-    default = 'stand_by' if options.view else 'start_stop'
+    # In lock-step nobody may command, and an hour would pass without anything to see.
+    stands_by = options.view and options.scenario is None and not options.lock_step
+    default = 'stand_by' if stands_by else 'start_stop'
     named = default if options.scenario is None else options.scenario
     scenario = load_scenario(named)
-    if options.view and options.scenario is None:
+    if stands_by:
         scenario = replace(scenario, duration_s=VIEWED_S)
     overrides = _overrides(scenario, options, ros)
     file = ros_arguments.given_file(options.parameters, ros, '--parameters')
@@ -297,7 +299,7 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add('scenario', nargs='?',
         help='scenario file, by its path or in config/scenarios (default: start_stop, and with '
-        '--view an hour for your commands)')
+        '--view, but for --lock-step, an hour for your commands)')
     add('--lock-step', action='store_true',
         help='wait for every target, so that the run does not depend on the speed of the machine')
     sharing = parser.add_mutually_exclusive_group()

@@ -349,6 +349,17 @@ def test_help_of_walk_lists_the_scenarios(processes: Processes) -> None:
     assert 'start_stop' in process.output and 'votes' in process.output
 
 
+@pytest.mark.parametrize(('words', 'played', 'seconds'), [
+    ('', 'start_stop', None), ('--view', 'stand_by', 3600.0),
+    ('--view --lock-step', 'start_stop', None),
+    ('stand_by --view --lock-step', 'stand_by', 300.0)])
+def test_what_is_played_without_a_scenario(words: str, played: str, seconds: float | None) -> None:
+    options = walk_command._parser().parse_args(words.split())
+    scenario = walk_command._planned(options, RosArguments()).scenario
+    assert scenario.name == played
+    assert scenario.duration_s == (seconds or walk_command.load_scenario(played).duration_s)
+
+
 def test_a_report_says_how_far_it_is_and_a_full_disk_ends_it_in_a_line_before_what_is_said_last(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
         capsys: pytest.CaptureFixture[str]) -> None:
