@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from importlib import import_module
 
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.suite_table import WALKING, WALKING_NODES
 
 
@@ -31,7 +32,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for kind in WALKING:
             node_class = getattr(import_module(kind.module), kind.class_name)
             for name in filter(chosen.__contains__, kind.instances):
-                node = node_class(name)
+                try:
+                    node = node_class(name)
+                except ParameterError as error:
+                    raise ParameterError(f'{name}: {error}') from error
                 node.local = local
                 yield node
 

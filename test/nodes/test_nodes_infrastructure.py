@@ -747,6 +747,8 @@ def test_bad_arguments_end_a_process_with_status_two(processes: Processes, tmp_p
         (processes.node('reference_filter', alpha_r='fast'), 2, ('alpha_r', 'fast', 'number')),
         (processes.node('reference_filter', alpha='3.0'), 2, ("'alpha'", 'alpha_r')),
         (processes.node('reference_filter', '-p'), 2, ('-p',)),
+        (processes.node('composed_suite', stamped_cmd_vel=True), 2,
+         ("composed_suite: canonical_oscillators: there is no parameter 'stamped_cmd_vel'",)),
         (processes.python('-m', 'dmp_cpg_ros', 'reference_filter', '--fast'), 2, ('--fast',)),
         (processes.python('-m', 'dmp_cpg_ros', 'reference_filter', '--help'), 0,
          ('alpha_r', 'cmd_vel', 'geometry_msgs/msg/Twist')),
