@@ -42,13 +42,18 @@ from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
 INTERRUPTED = 130
 """Exit status after Ctrl-C."""
 
-ENDLESS = ('cmd_vel', 'teleop', 'joystick', 'echo')
+DRIVING = ('cmd_vel', 'teleop', 'joystick')
+"""Commands whose last command is zero, whatever ends them."""
+
+ENDLESS = (*DRIVING, 'echo')
 """Commands that Ctrl-C ends as it should."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
     options, words = prepared(_parser(), arguments)
+    if options.command not in DRIVING:
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # nodes | head ends quietly
     try:  # the last command is zero and the terminal is as it was, whatever ends it
         options.run(connected('robot_client', words, options.wait), options)
     except (DmpCpgError, RuntimeError) as error:
@@ -149,7 +154,6 @@ def show_nodes(client: SuiteClient, options: argparse.Namespace) -> None:
 
 def echo(client: SuiteClient, options: argparse.Namespace) -> None:
     """Print the messages of a topic as YAML."""
-    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # echo TOPIC | head ends quietly
     client.meet(['inhibition'])
     name = client.node.resolve_topic_name(options.topic)
     ends = client.node.get_publishers_info_by_topic
@@ -205,6 +209,12 @@ def _sending(rate_hz: float = 10.0) -> tuple[_Argument, ...]:
                    help='send TwistStamped, for a suite with stamped_cmd_vel:=true'))
 
 
+EVERYWHERE = (
+    _takes('--namespace', metavar='NAME', help="the suite's namespace", default=argparse.SUPPRESS),
+    _takes('--wait', metavar='SECONDS', type=positive, default=argparse.SUPPRESS,
+           help='how long to look for the suite (default: 10)'))
+"""Options before the command or after it."""
+
 COMMANDS: tuple[tuple[str, Callable[..., None], str, tuple[_Argument, ...]], ...] = (
     ('cmd_vel', publish_command, 'command a velocity until Ctrl-C', (
         _takes('v_x', type=number, help='forward [m/s]'),
@@ -248,14 +258,14 @@ def _parser() -> argparse.ArgumentParser:
         'domain of ROS_DOMAIN_ID; --ros-args are taken as by every node.',
         epilog='Exit status: 0 when it was done, 1 when no suite is found or it refuses, 2 '
         'for bad input, 130 for Ctrl-C before it was done.')
-    parser.add_argument('--namespace', metavar='NAME', help="the suite's namespace")
-    parser.add_argument('--wait', metavar='SECONDS', type=positive, default=10.0,
-                        help='how long to look for the suite (default: 10)')
+    parser.set_defaults(namespace=None, wait=10.0)
+    for flags, how in EVERYWHERE:
+        parser.add_argument(*flags, **how)
     added = parser.add_subparsers(metavar='COMMAND', dest='command', required=True)
     for name, run, text, arguments in COMMANDS:
         command = added.add_parser(name, help=text, description=f'{text[:1].upper()}{text[1:]}.')
         command.set_defaults(run=run)
-        for flags, how in arguments:
+        for flags, how in (*EVERYWHERE, *arguments):
             command.add_argument(*flags, **how)
     return parser
 

@@ -222,6 +222,28 @@ def test_what_is_not_finite_is_bad_input(suite: Processes) -> None:
     assert 'finite' in refused(suite, 'push', '0', 'inf', '0', status=2)
 
 
+@pytest.mark.parametrize('words', [['nodes'], ['param', 'list', 'inhibition']])
+def test_who_reads_no_further_ends_a_list_quietly(suite: Processes, words: list[str]) -> None:
+    with subprocess.Popen(
+            [sys.executable, '-m', 'dmp_cpg_ros', 'robot_client', *words, '--wait', '20'],
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            env=suite.environment) as client:
+        assert client.stdout is not None and client.stderr is not None
+        client.stdout.close()
+        assert client.wait(90.0) == -signal.SIGPIPE
+        assert client.stderr.read() == ''
+
+
+@pytest.mark.parametrize(('words', 'namespace', 'wait'), [
+    ('inhibit', None, 10.0), ('inhibit --wait 2', None, 2.0), ('--wait 2 inhibit', None, 2.0),
+    ('--namespace a --wait 3 param get b c --wait 2', 'a', 2.0),
+    ('push 0 -60 0 --namespace b', 'b', 10.0)])
+def test_where_to_look_is_said_before_the_command_or_after_it(
+        words: str, namespace: str | None, wait: float) -> None:
+    options = robot_client._parser().parse_args(words.split())
+    assert (options.namespace, options.wait) == (namespace, wait)
+
+
 @pytest.mark.parametrize(('main', 'arguments', 'text'), [
     (robot_client.main, ['cmd_vel', 'fast'], "'fast' is no number"),
     (robot_client.main, ['--namespace', '9x y', 'nodes'], "'9x y' is no namespace"),
