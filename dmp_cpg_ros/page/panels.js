@@ -4,6 +4,7 @@
 
 export const COLOURS = { fl: '#ef5b5b', fr: '#4d9bff', rl: '#f2a93b', rr: '#3cc48a' };
 const TEXT = '#e8edf3', DIM = '#97a3b3', LINE = '#2c3542', GO = '#37b36b', HALT = '#e5484d';
+const SECONDS = 8;  // that the graph of speeds shows
 const FONT = 'system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
 
 /** Clear a canvas and return its context, in CSS pixels, with its size. */
@@ -74,6 +75,9 @@ export class Oscillators {
       ink.moveTo(x0 - unit * 1.2, y0); ink.lineTo(x0 + unit * 1.2, y0);
       ink.moveTo(x0, y0 - unit * 1.2); ink.lineTo(x0, y0 + unit * 1.2);
       ink.stroke();
+      ink.font = `10px ${FONT}`;
+      write(ink, 'x₁', x0 + unit * 1.2 + 3, y0);
+      write(ink, 'x₂', x0 + 4, y0 - unit * 1.2 + 3);
       ink.lineWidth = 1.5;
       const radius = Math.hypot(...frame.places[i]);
       disc(ink, x0, y0, unit * radius, null, '#465265');
@@ -196,7 +200,7 @@ export class Speeds {
   take(frame) {
     if (this.past.length && frame.time < this.past[this.past.length - 1].time) this.past = [];
     this.past.push({ time: frame.time, speed: frame.speed[0], reference: (frame.reference || [0])[0] });
-    while (this.past.length && this.past[0].time < frame.time - 8) this.past.shift();
+    while (this.past.length && this.past[0].time < frame.time - SECONDS) this.past.shift();
   }
 
   draw(frame) {
@@ -205,7 +209,7 @@ export class Speeds {
     const end = this.past[this.past.length - 1].time, top = 18;
     const all = this.past.flatMap((past) => [past.speed, past.reference]);
     const low = Math.min(-0.1, ...all), high = Math.max(0.3, ...all);
-    const x = (time) => width * (1 - (end - time) / 8);
+    const x = (time) => width * (1 - (end - time) / SECONDS);
     const y = (speed) => height - 2 - (height - top - 4) * (speed - low) / (high - low);
     ink.strokeStyle = LINE;
     ink.beginPath(); ink.moveTo(0, y(0)); ink.lineTo(width, y(0)); ink.stroke();
@@ -216,6 +220,11 @@ export class Speeds {
       this.past.forEach((past) => ink.lineTo(x(past.time), y(past[name])));
       ink.stroke();
     }
+    ink.font = `10px ${FONT}`;
+    write(ink, `${high.toFixed(1)} m/s`, 0, y(high) + 6);
+    write(ink, '0', 0, y(0) - 6);
+    write(ink, `${SECONDS} s`, width, y(0) - 6, DIM, 'right');
+    ink.font = `12px ${FONT}`;
     write(ink, `reference ${(frame.reference || [0])[0].toFixed(2)} m/s`, 0, 8, '#5aa9f5');
     write(ink, `body ${frame.speed[0].toFixed(2)} m/s, ${frame.speed[2].toFixed(2)} rad/s`, width, 8, TEXT, 'right');
   }
