@@ -127,6 +127,7 @@ class InhibitionNode(SuiteNode):
         self._promises.take_over_parameters()
         self._anew |= self._state.time_ns == self._state.request_ns or not (
             self._promises.holds_with(self.certified.running_in(self._network.gait)))
+        self._told = ()  # the certificate may be another one
 
     def _build(self) -> None:
         of = self.parameters_of

@@ -89,6 +89,32 @@ def test_the_robot_walks_on_when_a_change_is_refused_and_when_it_is_accepted(
             getattr(recording.targets, name), [getattr(tick.targets, name) for tick in ticks])
 
 
+LOST = """\
+name: lost
+duration: 1.2
+parameters: {allow_uncertified: true}
+events:
+  - {at: 0.1, inhibit: false}
+  - {at: 0.1, command: {v_x: 0.4}}
+  - {at: 0.8, set: {inhibition_gain: 40.0}}
+"""
+
+
+def test_a_change_that_costs_the_certificate_is_told_at_once_and_at_the_end(
+    processes: Processes, tmp_path: Path
+) -> None:
+    process = processes.walk(LOST, tmp_path / 'run', '--lock-step', '--composed',
+                             '--rate', str(SHARED_HZ))
+    assert process.wait(RUN_S) == 0, str(process)
+    told = [(event.values['certified'], event.time)
+            for event in load_recording(tmp_path / 'run' / 'bag').inhibition]
+    assert told[-1] == ('false', pytest.approx(0.8, abs=1.5 / SHARED_HZ))
+    assert [certified for certified, _ in told[:-1]] == ['true'] * (len(told) - 1)
+    assert '[ok] The certificate of the parameters at the start holds' in process.output
+    assert ('[NO] The certificate held whatever was changed: it failed from '
+            f'{told[-1][1]:.2f} s on') in process.output
+
+
 HANDED_OVER = """\
 name: handed_over
 duration: 6.5
