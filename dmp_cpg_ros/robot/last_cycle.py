@@ -22,7 +22,7 @@ SHORTEST_S, LONGEST_S = 0.2, 1.6
 END_S = 0.1
 """Part at the end of the memory that is compared with what was before [s]."""
 
-ALIKE = 0.1
+ALIKE = 0.25
 """Largest mean squared deviation, as a share of the variance, of what counts as a rhythm."""
 
 GRID_S = 0.004

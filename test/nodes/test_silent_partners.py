@@ -22,6 +22,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
+from dmp_cpg_ros.nodes.framework import gait_memory
 from dmp_cpg_ros.nodes.framework.known_stop import BRIEF_NS, PATIENT_NS
 from dmp_cpg_ros.nodes.inhibition import HEARTBEAT_NS, InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
@@ -333,7 +334,7 @@ def test_who_may_come_back_is_waited_for_before_the_gait_stops(ros: Ros) -> None
     for node in (reference, canonical):
         ros.nodes.append(node)
         node.start()
-    for age in (SILENT_NS + TICK, SILENT_NS + RETURN_NS, SILENT_NS + RETURN_NS + TICK):
+    for age in (0, SILENT_NS + TICK, SILENT_NS + RETURN_NS, SILENT_NS + RETURN_NS + TICK):
         reference.on_tick(age, {'joint_states': None, 'inhibition_gains': (0, RUNS)})
         canonical.on_tick(age, {'reference': np.zeros(3), 'inhibition_gains': (0, RUNS)})
         silent = age > SILENT_NS + RETURN_NS
@@ -393,12 +394,29 @@ def test_oscillators_and_reference_that_come_back_in_time_go_on_in_phase(
     for node, inputs in ((canonical, {'reference': then.r}), (reference, {'joint_states': None})):
         ros.nodes.append(node)
         node.start()
+        sent: list[Any] = []
+        node._publisher.publish = sent.append
+        node.on_tick(stamp - TICK, {**inputs, 'inhibition_gains': (stamp, RUNS)})
+        assert not sent  # the memory may come after the first tick
         node._memory._kept.append(message)
         node.elapsed = 0.0
         node.on_tick(stamp, {**inputs, 'inhibition_gains': (stamp, RUNS)})
     off = np.abs(canonical._state.x - then.x).max()
     assert (off < 0.01 and np.allclose(reference._r, then.r, atol=1e-3)) if goes_on else (
         off > 0.1 and not reference._r.any())
+
+
+def test_a_memory_that_does_not_come_is_waited_for_no_longer_than_for_a_while(ros: Ros) -> None:
+    reference, sent = ReferenceFilter(
+        'reference_filter', context=ros.context, parameter_overrides=RETURNS), list[Any]()
+    ros.nodes.append(reference)
+    reference.start()
+    reference._publisher.publish = sent.append  # type: ignore[method-assign]
+    for stamp in range(TICK, 10 * gait_memory.PATIENT_NS, TICK):
+        reference.on_tick(stamp, {'joint_states': None, 'inhibition_gains': (stamp, RUNS)})
+        if sent:
+            break
+    assert stamp == TICK + gait_memory.PATIENT_NS
 
 
 def test_gains_of_before_a_clock_that_was_set_back_are_those_of_a_silent_inhibition(ros: Ros

@@ -21,6 +21,11 @@ FRESH_NS = 20_000_000
 the robot has not moved, which waits; in real time the gait goes on without the node for longer.
 """
 
+PATIENT_NS = 300_000_000
+"""In real time: how long a node that may have been restarted waits for the memory [ns]. It is
+latched, and may come after the first tick.
+"""
+
 
 class GaitMemory:
     """Listens for what a node held before it was restarted, until its first tick.
@@ -38,8 +43,16 @@ class GaitMemory:
         self._node, self._reader = node, GaitMemoryReader(gaits)
         self._kept: deque[Any] = deque(maxlen=1)
         self._heard = node.listen('gait_memory', self._kept.append)
-        self._asked = False
+        self._asked, self._began_ns = False, -1
         self._fresh_ns = node.return_ns + BLIND_NS if node.return_ns else FRESH_NS
+
+    def awaited(self, stamp_ns: int) -> bool:
+        """Whether nothing is remembered yet that may be; a run's first tick has the stamp 0."""
+        if self._asked or self._kept or not self._node.return_ns or stamp_ns <= 0:
+            return False
+        if self._began_ns < 0:
+            self._began_ns = stamp_ns
+        return stamp_ns - self._began_ns < PATIENT_NS
 
     def take(self, stamp_ns: int) -> tuple[float, Any] | None:
         """At the first tick: the time since the memory [s] and what it says, if it is of the
