@@ -154,6 +154,8 @@ class RobotParameters(DriveParameters):
         0.024, "real time: age of a leg's targets beyond which the simulation waits for newer "
         'ones, up to target_timeout of wall time; 0: it never waits', 0.0, 10.0, unit='s')
     viewer: bool = parameter(False, 'whether to open a window with the robot')
+    live_view: bool = parameter(
+        False, 'whether to serve live_view, the suite in a browser, whose address is printed')
     fail: str = parameter(
         '', 'failure to inject when it is set, such as {component: imu, kind: stuck, for_s: 0.5}')
     failures_allowed: bool = parameter(False, 'whether failures may be injected')

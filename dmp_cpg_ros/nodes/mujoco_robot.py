@@ -7,6 +7,10 @@ In real time it keeps the wall clock's pace; in lock-step it waits for every tar
 
 from __future__ import annotations
 
+import ctypes
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -54,6 +58,12 @@ MAKE_UP_NS = 100_000_000
 CLOCK_EVERY = 4
 """In real time ``/clock`` ticks with every so many states: the suite itself goes by stamps."""
 
+PR_SET_PDEATHSIG = 1
+"""Of prctl(2): which signal a process gets when its parent ends. Linux only."""
+
+VIEW_WAITS_S = 86400.0
+"""How long a live view that the robot serves waits for the other nodes [s]."""
+
 TURN_TICKS = 25
 """In lock-step, where all nodes share a process: how often in ticks its executor has its turn."""
 
@@ -95,6 +105,7 @@ class MujocoRobotNode(DrivenRobot):
             self._held = self.publisher(f'{self.KIND}/holding_at')
             self.listen(f'{self.KIND}/advance_until', self._on_advance)
         self._viewer: Any = None
+        self._view = self._serve_view() if self._options.live_view else None
         if self._options.viewer and self._options.physics == 'mujoco':
             from dmp_cpg_ros.robot.camera import open_viewer
 
@@ -127,9 +138,19 @@ class MujocoRobotNode(DrivenRobot):
             self._others = None
 
     def cleanup(self) -> None:
-        """Close the window."""
+        """Close the window, and the view."""
         if self._viewer is not None:
             self._viewer.close()
+        if self._view is not None:
+            self._view.terminate()
+            self._view.wait()
+
+    def _serve_view(self) -> subprocess.Popen[bytes]:
+        """Start ``live_view``, which waits for the other nodes and ends with this process."""
+        return subprocess.Popen(
+            [sys.executable, '-m', 'dmp_cpg_ros', 'live_view', '--wait', f'{VIEW_WAITS_S}',
+             '--namespace', self.get_namespace()],
+            preexec_fn=lambda: ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM))
 
     def readers(self, topic: Interface) -> tuple[str, ...]:
         """Count those among the readers of a topic that read it with these parameters."""

@@ -23,6 +23,7 @@ import ros_processes
 from browser import Page, browser, find_browser
 from checkout import needs_make, recipe
 from ros_processes import (
+    SHARED_HZ,
     NodeProcess,
     Processes,
     Ros,
@@ -35,6 +36,7 @@ from ros_processes import (
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
+from dmp_cpg_ros.suite_table import ROBOT, WALKING_NODES
 
 shared_domain, suite, ros = (
     ros_processes.shared_domain, ros_processes.shared_suite, ros_processes.shared_ros)
@@ -306,6 +308,29 @@ def test_without_a_suite_it_says_so() -> None:
         process = alone.executable('live_view', '--wait', '0.5')
         assert process.wait(PATIENCE_S) == 1, str(process)
         assert 'live_view: no suite answers' in process.output
+
+
+def test_the_robot_serves_a_view_that_waits_for_the_other_nodes_and_ends_with_it() -> None:
+    with reserved_domain() as domain:
+        alone = Processes(domain)
+        try:
+            client = Client(alone.node(ROBOT, live_view=True, control_rate=SHARED_HZ))
+            assert client.ask('/scene').status != 200
+            alone.executable(
+                'composed_suite', *(name for name in WALKING_NODES if name != ROBOT),
+                '--ros-args', '-p', f'control_rate:={SHARED_HZ}')
+            assert client.scene()['robot'] == 'mini_quadruped'
+            client.process.signal(signal.SIGKILL)
+
+            def gone() -> bool:
+                try:
+                    return client.ask('/scene').status == 0
+                except OSError:
+                    return True
+
+            wait_until(gone, PATIENCE_S, what=lambda: 'the end of the view')
+        finally:
+            alone.end()
 
 
 def test_a_view_that_ends_lets_go(client: Client, suite: Processes, ros: Ros) -> None:
