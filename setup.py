@@ -138,6 +138,8 @@ setup(
         'parquet': ['pyarrow>=14'],
         # Studies on several machines: --cluster.
         'cluster': ['distributed>=2024.4'],
+        # A reader of URDF beside our own, for make test-extras.
+        'urdf': ['yourdfpy>=0.0.56'],
         # A learned policy beside the suite: python -m dmp_cpg_ros.studies.duel.
         'policy': ['onnxruntime>=1.17'],
     },
