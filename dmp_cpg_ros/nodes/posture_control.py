@@ -43,6 +43,9 @@ from dmp_cpg_ros.suite_table import POSTURE
 FORGOTTEN_NS = 300_000_000
 """Gap after which the estimator begins anew [ns]: the robot has come to a stand by itself."""
 
+MOST_WAITED = 25
+"""Ticks for which the estimator waits for an IMU before it goes on without."""
+
 NEVER_NS = 10**18
 """Longest time between two messages of a rate that is hardly any [ns]: thirty years."""
 
@@ -78,6 +81,7 @@ class BodyState:
         self._node = node
         self.estimate: BodyEstimate | None = None
         self._memory: EstimatorState | None = None
+        self._waited = 0
         self._estimator: BodyEstimator | None = None
         self.optional: tuple[str, ...] = ()
         self.readers: dict[str, Callable[[Any], Any]] = {
@@ -129,9 +133,13 @@ class BodyState:
             return RobotState(stamp_ns, position, velocity, effort, *base, np.zeros(3),
                               np.zeros(len(LEGS)))
         readings = sensor_readings(stamp_ns, values)
-        if self._memory and stamp_ns - self._memory.estimate.time_ns > FORGOTTEN_NS:
-            self._memory = None
-        self._memory, estimate = self._estimator.step(self._memory, readings)
+        memory = self._memory
+        away_ns = stamp_ns - memory.estimate.time_ns if memory else 0
+        if memory and FORGOTTEN_NS < away_ns <= FORGOTTEN_NS + self._node.return_ns:
+            self._memory, estimate = self._estimator.resumed(memory, readings)
+        else:
+            self._memory, estimate = self._estimator.step(
+                None if away_ns > FORGOTTEN_NS else memory, readings)
         self.estimate = estimate
         self._tell_problems(stamp_ns, estimate)
         if self._period_ns and stamp_ns // self._period_ns != self._published:
@@ -141,6 +149,19 @@ class BodyState:
                 self._transforms.publish(self._transform.fill(
                     stamp_ns, estimate.position_in_world, estimate.quaternion))
         return estimated_state(readings, estimate)
+
+    def awaited(self, stamp_ns: int, values: Mapping[str, Any]) -> bool:
+        """Whether the estimator would begin with readings of several ticks while the robot walks:
+        who comes back, or hears of the gait again, waits for those of one tick, for a while.
+        """
+        if self._estimator is None or not self._node.return_ns or stamp_ns <= 0:
+            return False
+        last_ns = self._memory.estimate.time_ns if self._memory else 0
+        if stamp_ns - last_ns <= FORGOTTEN_NS or values['imu'] and values['imu'][0] == stamp_ns:
+            self._waited = 0
+            return False
+        self._waited += 1
+        return self._waited <= MOST_WAITED
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Values for ``/diagnostics``: what no other topic tells of the estimate."""
@@ -219,6 +240,8 @@ class PostureControl(SuiteNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Compute the feedback for the stamp of the canonical state."""
+        if self._body.awaited(stamp_ns, values):
+            return
         state = self._body.state(stamp_ns, values)
         x, x_dot, gait = values['canonical_state']
         follow_gait(self, gait)

@@ -112,6 +112,8 @@ class CommandWatchdog:
         Of the newest targets of each leg [ns].
     fallback : str
         ``stand``, ``lie`` or ``damp`` while the robot falls back; else empty.
+    leaving : str
+        The same, and until the joints have gone over to the targets: on the way no gait may start.
     drives : DriveWatch
         Which joints do not do what they are told.
     lateness_ns : int
@@ -130,7 +132,7 @@ class CommandWatchdog:
         self._losing = False
         self._timeout_ns, self._lead_ns, self._targets = timeout_ns, lead_ns, np.zeros((3, 12))
         self.stamps: list[int | None] = [None] * len(LEGS)
-        self.fallback = ''
+        self.fallback = self.leaving = ''
         self._sense, self._stance_height = BodySense(description), description.stance_height
         lying, unit = lying_posture(description), Movements(description).time_unit
         self._ways = {'stand': (home_joint_position(description), STAND_S),
@@ -206,6 +208,7 @@ class CommandWatchdog:
         self.drives.see(state)
         targets = self._chosen(state)
         self._given = targets.position.copy()
+        self.leaving = self.fallback or self.leaving
         self.drives.tell(state.time_ns, targets)
         return targets
 
@@ -241,6 +244,8 @@ class CommandWatchdog:
             self._taking_s = TAKEN_UP_S
         if self._taken_ns and now - self._taken_ns < self._taking_s * 1e9:
             position += (1.0 - _share(now - self._taken_ns, self._taking_s)) * self._off
+        else:
+            self.leaving = ''
         return JointTargets(position, velocity, effort)
 
     def _astray(self) -> bool:

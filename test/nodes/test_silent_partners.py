@@ -21,6 +21,7 @@ from dmp_cpg_ros.core.balance.body_command import BodyCommand
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.nodes import posture_control
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework import gait_memory
 from dmp_cpg_ros.nodes.framework.known_stop import BRIEF_NS, PATIENT_NS
@@ -519,6 +520,28 @@ def test_a_leg_that_was_without_feedback_on_the_way_up_goes_on_from_where_its_jo
             'posture_feedback': (state.time_ns - age, feedback)})
         leg.elapsed = TICK * 1e-9
     np.testing.assert_array_equal(sent, (high[:3], low[:3]))
+
+
+def test_a_posture_control_that_comes_back_begins_with_the_readings_of_one_tick(ros: Ros) -> None:
+    _, state, tick = walked(300)
+    posture, sent = PostureControl(context=ros.context, parameter_overrides=RETURNS), list[Any]()
+    ros.nodes.append(posture)
+    posture.start()
+    posture._publisher.publish = sent.append
+    joints = state.joint_position, state.joint_velocity, state.joint_effort
+    level = np.zeros(3), np.array((0.0, 0.0, 9.81))
+    for k, (imu_ns, published) in enumerate([(-TICK, 0), (-TICK, 0), (0, 1), (-TICK, 2)]):
+        stamp = state.time_ns + k * TICK
+        posture.on_tick(stamp, {
+            'joint_states': joints, 'imu': (stamp + imu_ns, level), 'foot_contacts': None,
+            'canonical_state': (tick.x, tick.x_dot, tick.gait), 'reference': tick.r})
+        assert len(sent) == published
+    later = stamp + posture_control.FORGOTTEN_NS + TICK
+    for k in range(posture_control.MOST_WAITED + 1):  # an IMU that is dead is waited for a while
+        posture.on_tick(later + k * TICK, {
+            'joint_states': joints, 'imu': None, 'foot_contacts': None,
+            'canonical_state': (tick.x, tick.x_dot, tick.gait), 'reference': tick.r})
+        assert len(sent) == (2 if k < posture_control.MOST_WAITED else 3)
 
 
 def test_a_posture_control_that_comes_back_tells_no_mode_before_it_knows_it(ros: Ros) -> None:

@@ -146,7 +146,7 @@ def test_it_follows_the_legs_again_once_they_are_at_rest() -> None:
     assert walk.guard.fallback == 'stand'  # the legs still walk, the robot stands
     walk.loop.request(True)
     walk.go(800)
-    assert walk.loop.stop.state == 'at_rest' and not walk.guard.fallback
+    assert walk.loop.stop.state == 'at_rest' and not walk.guard.leaving
     walk.loop.request(False)
     walk.go(500)
     assert not walk.guard.fallback and not walk.robot.fallen
@@ -170,5 +170,6 @@ def test_it_follows_legs_that_rest_on_footholds_a_step_away() -> None:
                     q[3 * i:3 * i + 3], np.zeros(3), np.zeros(3)))
             state = robot.step(guard.targets(state))
         assert not guard.fallback and not robot.fallen, (leg, shift)
+        assert not guard.leaving
         assert np.linalg.norm(state.base_velocity_in_base) < 0.05
         assert np.abs(state.joint_position - q).max() < 0.1

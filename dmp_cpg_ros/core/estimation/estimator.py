@@ -165,7 +165,15 @@ class BodyEstimator:
             estimate = replace_unchecked(estimate, readings=frozen.with_joints(watch, readings))
         return EstimatorState(state, terrain, estimate, rate, blind, still, watch), estimate
 
-    def _begin(self, readings: SensorReadings) -> tuple[EstimatorState, BodyEstimate]:
+    def resumed(self, memory: EstimatorState, readings: SensorReadings
+                ) -> tuple[EstimatorState, BodyEstimate]:
+        """Go on after a while without readings, in which a body that walks has kept its attitude
+        and velocity; arguments and results as of :meth:`step`.
+        """
+        return self._begin(readings, memory)
+
+    def _begin(self, readings: SensorReadings, before: EstimatorState | None = None
+               ) -> tuple[EstimatorState, BodyEstimate]:
         """Start at rest: the accelerometer tells the vertical, the feet the ground. Where joints
         move, standing feet alone do, and how fast the body is.
         """
@@ -174,6 +182,8 @@ class BodyEstimator:
         up, zero = mid_stride.steadied(up) if moving else up, np.zeros(3)
         covariance = np.diag(np.repeat(np.square(INITIAL_DEVIATION), 3))
         state = FilterState(levelled(up), zero, zero, zero, covariance)
+        if before is not None:
+            state = replace_unchecked(before.filter, covariance=covariance)
         R = vec3.rotation(state.quaternion.tolist())
         flat = TerrainState(((0.0, 0.0, 0.0),) * len(LEGS), (0.0, 0.0))
         motion, normal = self._motion(flat, state, readings)
@@ -186,11 +196,17 @@ class BodyEstimator:
         contact = [vec3.times(R, place) for place in motion.contact_in_base]
         depths = [z for (_, _, z), stand in zip(contact, stands, strict=True) if stand]
         height = -sum(depths) / len(depths) if depths else 0.0
+        position, way = np.array((0.0, 0.0, height)), 0.0
+        if before is not None:
+            last = before.estimate
+            gone = 1e-9 * (readings.time_ns - last.time_ns) * np.array(
+                vec3.times(R, vec3.triple(state.velocity_in_base.tolist())))
+            position, way = last.position_in_world + gone, last.way + float(np.linalg.norm(gone))
         estimate = BodyEstimate(
-            readings.time_ns, np.array((0.0, 0.0, height)), state.quaternion,
+            readings.time_ns, position, state.quaternion,
             state.velocity_in_base, rate, height,
             np.array(normal_in_world(flat.slope)), np.array(trust), covariance,
-            self.parameters.gyro_noise**2 / BLIND, 0.0, _problems(readings))
+            self.parameters.gyro_noise**2 / BLIND, way, _problems(readings))
         feet = tuple((x, y, z + height if stand else 0.0)
                      for (x, y, z), stand in zip(contact, stands, strict=True))
         terrain = TerrainState(feet, leg_odometry.fitted_slope(feet)) if all(legs) else flat

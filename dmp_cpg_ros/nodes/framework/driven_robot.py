@@ -96,7 +96,7 @@ class DrivenRobot(SuiteNode):
         doubted, heard = guard.doubted(now), any(guard.stamps)
         silent = [leg for leg in guard.unheard(now) if leg not in doubted]
         if heard:
-            self.tell_drive(guard.fallback)
+            self.tell_drive(guard.leaving)
         self._tell_silence('doubted', now, bool(doubted), lambda: (
             f'targets of {", ".join(doubted)} are not believed: they jump by more than their '
             'velocity says, or repeat while they move'))

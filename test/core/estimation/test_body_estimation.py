@@ -250,3 +250,23 @@ def test_the_ground_is_found_under_the_feet(slope: tuple[float, float]) -> None:
         slope) + 0.003
     place = SWAY.pose((round(1.5 / TICK) - 1) * TICK)[0]
     assert estimate.height == pytest.approx(float(place @ normal), abs=0.004)
+
+
+def test_after_a_while_without_readings_it_goes_on_with_the_attitude_that_it_had(
+        exact: list[SensorReadings]) -> None:
+    """One reading of an accelerometer in the middle of a stride may be far off."""
+    estimator, memory = BodyEstimator(ROBOT, EstimationParameters()), None
+    for reading in exact[:300]:
+        memory, before = estimator.step(memory, reading)
+    assert memory is not None
+    blow = dataclasses.replace(exact[450], specific_force_in_base=np.array((9.5, 0.0, 1.0)))
+    assert abs(roll_pitch_yaw(estimator.step(None, blow)[1].quaternion)[1]) > 0.8
+    memory, estimate = estimator.resumed(memory, blow)
+    np.testing.assert_array_equal(estimate.quaternion, before.quaternion)
+    assert np.linalg.norm(estimate.position_in_world - before.position_in_world) < 0.1
+    assert estimate.way >= before.way
+    for reading in exact[451:]:
+        memory, estimate = estimator.step(memory, reading)
+    k = len(exact) - 1
+    off = np.abs(errors([*[estimate] * k, estimate])[k])
+    assert off[:5].max() < 0.01 and off[5] < 0.1  # nothing tells how far it has turned meanwhile
