@@ -23,7 +23,6 @@ import ros_processes
 from browser import Page, browser, find_browser
 from checkout import needs_make, recipe
 from ros_processes import (
-    SHARED_HZ,
     NodeProcess,
     Processes,
     Ros,
@@ -314,11 +313,10 @@ def test_the_robot_serves_a_view_that_waits_for_the_other_nodes_and_ends_with_it
     with reserved_domain() as domain:
         alone = Processes(domain)
         try:
-            client = Client(alone.node(ROBOT, live_view=True, control_rate=SHARED_HZ))
+            client = Client(alone.node(ROBOT, live_view=True))
             assert client.ask('/scene').status != 200
             alone.executable(
-                'composed_suite', *(name for name in WALKING_NODES if name != ROBOT),
-                '--ros-args', '-p', f'control_rate:={SHARED_HZ}')
+                'composed_suite', *(name for name in WALKING_NODES if name != ROBOT))
             assert client.scene()['robot'] == 'mini_quadruped'
             client.process.signal(signal.SIGKILL)
 

@@ -17,7 +17,7 @@ from dmp_cpg_ros.suite_table import WALKING, Kind
 
 FILE = find_config('suite.yaml')
 
-PER_RUN = {'leg', 'stamped_cmd_vel', 'gated', 'viewer'}
+PER_RUN = {'leg', 'stamped_cmd_vel', 'gated', 'viewer', 'live_view'}
 """Parameters that are chosen for a run and not for a robot."""
 
 
