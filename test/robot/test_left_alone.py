@@ -145,6 +145,11 @@ def test_it_follows_the_legs_again_once_they_are_at_rest() -> None:
     walk.go(300)
     assert walk.guard.fallback == 'stand'  # the legs still walk, the robot stands
     walk.loop.request(True)
+    for _ in range(800):
+        walk.go(1)
+        if not walk.guard.fallback:
+            break
+    assert walk.guard.leaving == 'stand'  # on the way to the legs it tells so still
     walk.go(800)
     assert walk.loop.stop.state == 'at_rest' and not walk.guard.leaving
     walk.loop.request(False)
