@@ -313,9 +313,9 @@ class InhibitionNode(SuiteNode):
         barring = self._barring
         if not stop and barring != 'standing':
             service = 'recover' if barring == 'damped' else 'stand_up'
-            return False, (
-                f'the gait cannot start: the robot is {barring}, not standing; call '
-                f'{service}, or wait until it stands')
+            way = ('ask again when it follows its legs' if barring.endswith('(stand)') else
+                   f'call {service}, or wait until it stands')
+            return False, f'the gait cannot start: the robot is {barring}, not standing; {way}'
         if self._blind:
             if stop:
                 self._state = self._supervisor.request(self._state, True)
