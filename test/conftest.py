@@ -30,13 +30,25 @@ LONG = ('project', 'suite', 'commands', 'studies', 'nodes')
 """Folders whose tests walk or start processes, those that take longest first."""
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Name the marker for who has not installed its plugin."""
+    config.addinivalue_line('markers', 'flaky(reruns=1): run once more when it fails')
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with what takes long: workers that share the tests then end at the same time."""
+    """Begin with what takes long: workers that share the tests then end at the same time. What
+    starts processes in real time is run once more when it fails, for the machine may have had no
+    time for it; the summary tells of it.
+    """
     def rank(item: pytest.Item) -> int:
         folder = item.path.relative_to(Path(__file__).parent).parts[0]
         return LONG.index(folder) if folder in LONG else len(LONG)
 
     items.sort(key=rank)
+    for item in items:
+        if 'ros_processes' in {getattr(value, '__module__', '') for value in vars(
+                getattr(item, 'module', object)).values()}:
+            item.add_marker(pytest.mark.flaky(reruns=1))
 
 
 def pytest_collection_finish() -> None:
@@ -46,8 +58,14 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Say why tests were skipped: a line for every reason, where ``-rs`` has one for every place.
+    """Say why tests were skipped, a line for every reason, where ``-rs`` has one for every place;
+    and how those had failed that were run once more.
     """
+    again = terminalreporter.stats.get('rerun', [])
+    if again:
+        terminalreporter.section('run once more')
+    for report in again:
+        terminalreporter.line(f'{report.nodeid}\n{report.longreprtext}')
     skipped = terminalreporter.stats.get('skipped', [])
     if skipped:
         terminalreporter.section('skipped')
@@ -58,6 +76,12 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 _crashed: set[str] = set()
 
 
+def _run_again_anyway(config: Any, crashitem: str) -> bool:
+    """Whether pytest-rerunfailures runs a test once more."""
+    known = getattr(config, 'failures_db', None)
+    return known is not None and known.get_test_reruns(crashitem) > 0
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_handlecrashitem(crashitem: str, report: Any, sched: Any) -> None:
     """Run a test once more whose process has crashed, and count it as ``rerun``.
@@ -65,7 +89,7 @@ def pytest_handlecrashitem(crashitem: str, report: Any, sched: Any) -> None:
     Fast DDS sometimes does where a node of the test itself is destroyed among others that end;
     a test that hangs ends in the same way. Whoever does so twice has failed.
     """
-    if crashitem not in _crashed:
+    if crashitem not in _crashed and not _run_again_anyway(sched.config, crashitem):
         _crashed.add(crashitem)
         sched.mark_test_pending(crashitem)
         report.outcome = 'rerun'

@@ -44,6 +44,7 @@ DEPENDENCIES = {
 }
 TEST_DEPENDENCIES = {
     'pytest': 'python3-pytest',
+    'pytest-rerunfailures': 'python3-pytest-rerunfailures',
     'pytest-xdist': 'python3-pytest-xdist',
     'hypothesis': 'python3-hypothesis',
     'ruff': 'python3-ruff-pip',
