@@ -75,3 +75,49 @@ def test_who_does_not_follow_is_named(ros: Ros, monkeypatch: pytest.MonkeyPatch,
     monkeypatch.setattr(requests, 'PATIENCE_S', 0.2)
     assert change(ros, Follower(1), Follower(float('inf'), answers)) == [
         f'{INHIBITION} does not follow']
+
+
+class Clockwork:
+    """A node whose timer runs out when the test says so, also after it was destroyed."""
+
+    def create_timer(self, period_s: float, run_out: Any, clock: Any) -> Any:
+        self.run_out = run_out
+        return object()
+
+    def destroy_timer(self, timer: Any) -> None:
+        pass
+
+
+class Postman:
+    """Has every answer at once, and hands it over when the test says so."""
+
+    def __init__(self) -> None:
+        self.letters: list[Any] = []
+
+    def call_async(self, request: GetParameters.Request) -> Postman:
+        return self
+
+    def done(self) -> bool:
+        return True
+
+    def result(self) -> GetParameters.Response:
+        return Follower(1).call_async(GetParameters.Request()).result()
+
+    def add_done_callback(self, hand_over: Any) -> None:
+        self.letters.append(hand_over)
+
+
+def test_an_answer_that_is_there_is_not_asked_for_again_nor_counted_for_another() -> None:
+    node, reference, inhibition, told = Clockwork(), Postman(), Postman(), list[str]()
+    setter = ParameterSetter.__new__(ParameterSetter)
+    setter._node, setter._timer = node, None
+    setter._getters = {REFERENCE: reference, INHIBITION: inhibition}
+    setter._await([REFERENCE, INHIBITION], {'coupling_gain': 50.0}, told.append)
+    node.run_out()
+    assert len(reference.letters) == 1 and not inhibition.letters
+    reference.letters[0](reference)
+    node.run_out()
+    assert len(inhibition.letters) == 1 and not told
+    inhibition.letters[0](inhibition)
+    node.run_out()
+    assert told == [''] and len(inhibition.letters) == 1

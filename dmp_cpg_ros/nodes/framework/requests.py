@@ -93,15 +93,16 @@ class ParameterSetter:
                done: Callable[[str], None]) -> None:
         """Ask one follower after the other, now and then, until it has the values."""
         request, values = GetParameters.Request(names=list(wanted)), list(wanted.values())
-        end_s, asked = time.monotonic() + PATIENCE_S, Future()
+        end_s, asked = time.monotonic() + PATIENCE_S, False
 
         def ask_next() -> None:
             nonlocal asked
-            asked = self._getters[followers[0]].call_async(request)
-            asked.add_done_callback(answered)
+            asked = True
+            self._getters[followers[0]].call_async(request).add_done_callback(answered)
 
         def answered(future: Future) -> None:
-            answer = future.result()
+            nonlocal asked
+            answer, asked = future.result(), False
             if timer is self._timer and answer is not None and values == [
                     plain(parameter_value_to_python(value)) for value in answer.values]:
                 del followers[0]
@@ -111,9 +112,11 @@ class ParameterSetter:
                     end('')
 
         def look() -> None:
+            if timer is not self._timer:
+                return  # it had run out before it was destroyed
             if time.monotonic() > end_s:
                 end(f'{followers[0]} does not follow')
-            elif asked.done():
+            elif not asked:
                 ask_next()
 
         def end(reason: str) -> None:
