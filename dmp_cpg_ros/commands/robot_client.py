@@ -37,14 +37,10 @@ from dmp_cpg_ros.nodes.framework.execution import OK
 from dmp_cpg_ros.nodes.framework.parameters import plain
 from dmp_cpg_ros.nodes.messages.commands import push_force
 from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, TOPICS, interface
-from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES, read_drive_mode
 from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C."""
-
-TOLD_WITHIN_S = 0.5
-"""How long what a late reader is told takes at most, on a machine that has time [s]."""
 
 DRIVING = ('cmd_vel', 'teleop', 'joystick')
 """Commands whose last command is zero, whatever ends them."""
@@ -74,30 +70,9 @@ def request(client: SuiteClient, options: argparse.Namespace) -> None:
     stop = {'inhibit': True, 'resume': False}.get(options.command)
     answer = (client.call(options.command, Trigger.Request()) if stop is None else
               client.call('inhibit', SetBool.Request(data=stop)))
-    if stop is False and not answer.success and _follows_again(client, options.wait):
-        answer = client.call('inhibit', SetBool.Request(data=stop))
     if not answer.success:
         raise ClientError(answer.message)
     print(answer.message)
-
-
-def _follows_again(client: SuiteClient, wait_s: float) -> bool:
-    """Wait for a robot that has come to a stand by itself, as it does where targets are late for
-    a moment; returns whether it follows its legs again.
-    """
-    topic, modes = interface('drive_mode'), ['']
-
-    def learn(message: Any) -> None:
-        modes[0] = read_drive_mode(message)
-
-    client.node.create_subscription(topic.type, topic.name, learn, topic.reader_qos)
-    client.spin_until(lambda: modes[0], TOLD_WITHIN_S)
-    if modes[0] != 'stand':
-        return False
-    print('the robot looks after itself: waiting until it follows its legs', file=sys.stderr)
-    client.spin_until(lambda: modes[0] != 'stand', wait_s)
-    client.spin_until(lambda: False, TOLD_WITHIN_S)  # who is asked has been told as well
-    return modes[0] == DRIVE_MODES[0]
 
 
 def publish_command(client: SuiteClient, options: argparse.Namespace) -> None:

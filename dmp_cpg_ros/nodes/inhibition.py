@@ -54,6 +54,9 @@ JOIN_EVERY_S = 0.1
 OVERTAKEN = 'done; another request came before it was predicted'
 """Answer to a request that was no longer in force when it had been predicted."""
 
+PATIENCE_NS = 5_000_000_000
+"""How long a start waits for a robot that stands by itself [ns]."""
+
 UNKNOWN = 'done; it could not be predicted'
 """Begin of the answer to a request of which no time can be said."""
 
@@ -84,6 +87,7 @@ class InhibitionNode(SuiteNode):
         self._r, self._body_mode = np.zeros(3), 'standing'
         self._promises, self._anew = Promises(self, self.certified, self._network.gait), False
         self._answer: tuple[bool, Later] | None = None
+        self._put_off: tuple[Later, int] | None = None
         self._told_ns, self._blind = -HEARTBEAT_NS, ''
         self._drive, self._joined, self._asked = FOLLOWING, False, False
         self._began_ns = -1
@@ -253,6 +257,7 @@ class InhibitionNode(SuiteNode):
         self._drive = read_drive_mode(message)
         if self._drive != FOLLOWING and self._joined:
             self._stop_now()
+        self._take_put_off()
 
     def _stop_now(self, automatic: bool = True) -> None:
         if not self._state.in_force or self._state.automatic and not automatic:
@@ -264,6 +269,8 @@ class InhibitionNode(SuiteNode):
 
     def _watch(self, now_ns: int) -> None:
         """Notice on the robot's clock that nothing is known of the gait any more."""
+        if self._put_off is not None and now_ns > self._put_off[1]:
+            self._answer_put_off(self._refusal)
         if not self._joined:
             return
         if now_ns - self._state.time_ns > BLIND_NS and not self._blind:
@@ -305,17 +312,19 @@ class InhibitionNode(SuiteNode):
         """Take a request; the answer says when it will be fulfilled. It acts from the next tick
         on: in lock-step from that of this node, else from the next one of the oscillators.
         """
-        stop: bool = request.data
+        return self._take(request.data, Later())
+
+    def _take(self, stop: bool, answer: Later) -> tuple[bool, str] | Later:
         self._asked = True
         self.take_parameters()  # with which the tick begins in which the request acts
         if self._x is None:
             return False, 'no canonical_state and reference yet; is canonical_oscillators running?'
-        barring = self._barring
-        if not stop and barring != 'standing':
-            service = 'recover' if barring == 'damped' else 'stand_up'
-            way = ('ask again when it follows its legs' if barring.endswith('(stand)') else
-                   f'call {service}, or wait until it stands')
-            return False, f'the gait cannot start: the robot is {barring}, not standing; {way}'
+        self._answer_put_off((False, 'another request came before the robot followed its legs'))
+        if not stop and self._stands_by_itself and not self.lock_step:
+            self._put_off = answer, self.health.stamp_ns + PATIENCE_NS
+            return answer
+        if not stop and self._barring != 'standing':
+            return self._refusal
         if self._blind:
             if stop:
                 self._state = self._supervisor.request(self._state, True)
@@ -338,10 +347,38 @@ class InhibitionNode(SuiteNode):
             self._publish_gains()
         if self._answer is not None:
             self._answer[1].deliver((True, OVERTAKEN))
-        answer = Later()
         self._answer = stop, answer
         self._predict()
         return answer.delivered or answer
+
+    @property
+    def _stands_by_itself(self) -> bool:
+        """Whether the robot has come to a stand by itself, as it does for a moment where targets
+        are late.
+        """
+        return self._drive == 'stand' and self._body_mode == 'standing'
+
+    @property
+    def _refusal(self) -> tuple[bool, str]:
+        """Why the gait cannot start."""
+        way = ('ask again when it follows its legs' if self._stands_by_itself else
+               f'call {"recover" if self._barring == "damped" else "stand_up"}, or wait until it '
+               'stands')
+        return False, f'the gait cannot start: the robot is {self._barring}, not standing; {way}'
+
+    def _take_put_off(self) -> None:
+        """Take the start that waits for the robot, or refuse it, once that does something else."""
+        if self._put_off is None or self._stands_by_itself:
+            return
+        (answer, _), self._put_off = self._put_off, None
+        known = self._take(False, answer)
+        if known is not answer:
+            answer.deliver(known)
+
+    def _answer_put_off(self, answer: tuple[bool, str]) -> None:
+        if self._put_off is not None:
+            (later, _), self._put_off = self._put_off, None
+            later.deliver(answer)
 
     def _told_of(self, stop: bool) -> tuple[bool, str]:
         """What a request is answered once it has been predicted."""

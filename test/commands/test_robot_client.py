@@ -30,12 +30,9 @@ from ros_processes import (
     Processes,
     Ros,
     composed_suite,
-    joined,
-    own_domain,
     reserved_domain,
     wait_until,
 )
-from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.commands import live_view, robot_client
 from dmp_cpg_ros.commands.joystick import AXIS, BUTTON, EVENT, FULL, INITIAL
@@ -140,44 +137,6 @@ def test_a_suite_in_a_namespace_is_found_there_and_elsewhere_named(
         ros.spin_until(lambda: any(entry.twist.linear.x > 0.2 for entry in references))
         assert '--namespace /robot1' in told(elsewhere)
         assert 'ready' in told(nodes, 0)
-
-
-@pytest.fixture
-def elsewhere() -> Iterator[tuple[Processes, Ros]]:
-    """Processes and a node in a domain where no suite runs."""
-    with own_domain() as domain, joined(domain) as ros:
-        started = Processes(domain)
-        try:
-            yield started, ros
-        finally:
-            started.end()
-
-
-@pytest.mark.parametrize('then, asked', [('following', [False, False]), ('damp', [False])])
-def test_a_gait_is_asked_for_again_when_the_robot_follows_its_legs(
-        elsewhere: tuple[Processes, Ros], then: str, asked: list[bool]) -> None:
-    processes, ros = elsewhere
-    topic, drive, requests = interface('drive_mode'), ['stand'], []
-    publisher = ros.node.create_publisher(topic.type, topic.name, topic.publisher_qos)
-
-    def answer(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        requests.append(request.data)
-        response.success = drive[0] == 'following'
-        response.message = f'the robot: {drive[0]}'
-        return response
-
-    ros.node.create_service(SetBool, 'inhibit', answer)
-    ros.node.create_service(Trigger, 'inhibition/ready', lambda _, response: response)
-    publisher.publish(topic.type(data=drive[0]))
-    client = processes.executable(*CLIENT, 'resume')
-    ros.spin_until(lambda: 'waiting until it follows its legs' in client.output,
-                   what=lambda: f'{client}')
-    drive[0] = then
-    publisher.publish(topic.type(data=drive[0]))
-    ros.spin_until(lambda: not client.running, what=lambda: f'{client}')
-    assert requests == asked and client.wait() == (then != 'following')
-    assert client.output.count('the robot: stand') == (then != 'following')
-    assert ('the robot: following' in client.output) == (then == 'following')
 
 
 def test_a_request_is_asked_once_and_its_answer_printed(

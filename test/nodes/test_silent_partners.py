@@ -24,8 +24,9 @@ from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.nodes import posture_control
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework import gait_memory
+from dmp_cpg_ros.nodes.framework.judging import Later
 from dmp_cpg_ros.nodes.framework.known_stop import BRIEF_NS, PATIENT_NS
-from dmp_cpg_ros.nodes.inhibition import HEARTBEAT_NS, InhibitionNode
+from dmp_cpg_ros.nodes.inhibition import HEARTBEAT_NS, PATIENCE_NS, InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.canonical_state import GaitMemoryWriter
 from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader, read_state_word
@@ -297,10 +298,36 @@ def test_what_is_asked_of_a_node_that_has_just_come_back_is_not_lost(
 
 def test_the_gait_stops_while_the_robot_looks_after_itself(ros: Ros) -> None:
     node, _ = watching(ros, KNOWN)
-    node._on_drive(String(data='stand'))
+    node._on_drive(String(data='lie'))
     assert node._state.requested and node._state.automatic
     told, answer = node._take_request(SetBool.Request(data=False))
-    assert not told and 'looking after itself' in answer
+    assert not told and 'looking after itself (lie), not standing; call stand_up' in answer
+    node.destroy_node()
+
+
+@pytest.mark.parametrize('then, words', [
+    ('following', 'walking in'), ('damp', 'is damped, not standing; call recover'),
+    ('stand', 'looking after itself (stand), not standing; ask again when it follows its legs'),
+    ('inhibit', 'another request came before the robot followed its legs')])
+def test_a_start_waits_for_a_robot_that_stands_by_itself(
+        ros: Ros, then: str, words: str) -> None:
+    node, now = watching(ros, KNOWN)
+    node._on_drive(String(data='stand'))
+    answer, sent = node._take_request(SetBool.Request(data=False)), list[tuple[bool, str]]()
+    assert isinstance(answer, Later)
+    answer.bound_for(sent.append)
+    node._watch(now + TICK)
+    assert node._state.requested and not sent
+    if then == 'inhibit':
+        node._take_request(SetBool.Request(data=True))
+    else:
+        node._on_drive(String(data=then))
+    if then == 'stand':
+        node._watch(now + PATIENCE_NS + 2 * TICK)
+    ros.spin_until(lambda: bool(sent))
+    ((taken, text),) = sent
+    assert taken is (then == 'following') and words in text
+    assert node._state.requested is not taken
     node.destroy_node()
 
 
