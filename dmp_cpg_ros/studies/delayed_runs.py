@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,18 +18,40 @@ PATTERNS = ('one age', 'edges', 'kept', 'kept from inhibited', 'chosen')
 """How ages are distributed and vary."""
 
 _CHOICES = 12  # ages of which one is chosen
+_MOST_RUNS = 4  # times as long as rest is waited for where something moves
 
 
 def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random.Generator
           ) -> NDArray[np.bool_]:
-    """Whether C is left or rest is not reached, for all ages at once."""
+    """Whether C is left or rest is not reached, for all ages at once.
+
+    Parameters
+    ----------
+    capture : Capture
+        What is captured.
+    kind : str
+        ``late`` for the switch; of samples ``held``, ``carried``, and what nothing certifies:
+        ``held at once`` from the entry on and not before, so that they lag by more than a walk with
+        them lets them, and ``always carried``, in C too.
+    ages : ndarray (count,)
+        Largest ages [s].
+    pattern : str
+        One of ``PATTERNS``.
+    rng : Generator
+        Random numbers.
+
+    Returns
+    -------
+    ndarray (count,) of bool
+    """
     run = _DelayedRun(capture, kind, ages, pattern, rng)
-    for tick in range(run.steps):
+    for tick in range(_MOST_RUNS * run.steps):
         run.let_samples_age()
         acts = run.acts()
         run.judge(acts, tick)
         run.advance(acts)
-        run.note_speed(tick)
+        if run.note_way(tick) and not np.any(run.moves & ~run.bad):
+            break
     return (run.bad | ~run.acted | run.moves) & ~run.aside
 
 
@@ -40,7 +64,7 @@ class _DelayedRun:
     Attributes
     ----------
     steps : int
-        Number of steps until rest must be reached.
+        Number of steps until rest should be reached.
     acted, bad, aside : ndarray (count,)
         Whether inhibition has acted; whether C was left, or something diverged; whether a leg
         turned backwards before, of which nothing is certified.
@@ -49,18 +73,19 @@ class _DelayedRun:
     def __init__(self, capture: Capture, kind: str, ages: Array, pattern: str,
                  rng: np.random.Generator) -> None:
         self._capture, self._pattern = capture, pattern
-        self._late, self._carried = kind == 'late', kind in ('carried', 'steady')
+        self._kind, self._late, self._carried = kind, kind == 'late', kind[-7:] == 'carried'
         self._k, self._rho = capture.coupling, float(capture.system.rho.max())
         count, degree = len(ages), float(self._k.sum(axis=1).max())
-        self._step = min(float(ages[0]) / 10.0, 0.1 / capture.omega, 0.1 / degree)
+        self._step = min(float(ages[0]) / 10.0, 0.1 / capture.omega, 0.2 / degree)
         # a sample is held for a step
         self._most = np.maximum(0, np.floor(ages / self._step).astype(int) - 1)
-        rest = 8.0 * float(ages[-1]) + 6.0 / max(capture.undelayed.rate, 1.0)
+        rest = 4.0 * float(ages[-1]) + 6.0 / max(capture.undelayed.rate, 1.0)
         self.steps = int(rest / self._step)
         self._walk_up_to_the_region(capture.omega / (1.0 + degree * ages * (kind == 'held')), rng)
         self._draw_ages(rng)
-        self._fastest = np.zeros((4, count))
+        self._farthest, self._from = np.zeros((4, count)), self._z
         self._backwards = np.full(count, -len(self._past))
+        self._inside = np.full(self._z.shape, -1)    # ticks since nodes came into C, or -1
         self.acted, self.bad, self.aside = np.zeros((3, count), dtype=bool)
 
     def _walk_up_to_the_region(self, omega: Array, rng: np.random.Generator) -> None:
@@ -71,10 +96,11 @@ class _DelayedRun:
                  - 0.5 * self._step * capture.omega)
         turn = np.exp(1j * self._step * np.arange(1 - length, 1)[:, None] * omega)[:, :, None]
         apart = rng.uniform(-0.5, 0.5, (len(omega), size)) * capture.places / r
+        apart *= 0.5 if self._carried else 1.0
         apart[:, capture.held] = 0.0
         self._past = r * np.exp(1j * (start + apart)) * turn           # (length, count, N), a ring
-        self._rates = 1j * omega[:, None] * self._past
         self._z, self._now = self._past[-1], length - 1
+        self._rate = 1j * omega[:, None] * self._z
 
     def _draw_ages(self, rng: np.random.Generator) -> None:
         """Ages (count, N, N) of samples at the begin, in steps, and of what the switch sees."""
@@ -88,9 +114,8 @@ class _DelayedRun:
     def let_samples_age(self) -> None:
         """By a step, until others come, by the pattern."""
         if self._pattern == 'chosen' and self.acted.any():
-            self._age = chosen_ages(
-                self._z - self._capture.radius, self._past, self._rates * self._carried,
-                self._now, self._most, self._step, self._age)
+            self._age = chosen_ages(self._z - self._capture.radius, self._past, self._now,
+                                    self._most, self._age, self._turned)
         elif self._pattern[:4] in ('kept', 'chos'):
             self._age = np.where(self._age >= self._most[:, None, None], 0, self._age + 1)
             self._seen_age = np.where(self._seen_age >= self._most, 0, self._seen_age + 1)
@@ -109,8 +134,11 @@ class _DelayedRun:
         """Note what is wrong now."""
         capture, z = self._capture, self._z
         entered = acts & ~self.acted
-        self._backwards[np.any((self._rates[self._now] * np.conj(z)).imag < 0.0, axis=1)] = tick
-        self.aside |= entered & (tick - self._backwards <= self._most)
+        self._inside = np.where((self._inside >= 0) | (
+            np.abs(z - capture.radius) <= capture.region_radius), self._inside + 1, -1)
+        self._backwards[np.any((self._rate * np.conj(z)).imag < 0.0, axis=1)] = tick
+        self.aside |= entered & (tick - self._backwards <= self._most) & (
+            self._kind != 'held at once')
         self.acted |= acts
         outside = np.abs(z[:, capture.held] - capture.radius) > (
             capture.region_radius * (1.0 + 1e-9))
@@ -131,36 +159,46 @@ class _DelayedRun:
         z = faded * z + 0.5 * feed * (self._field(z) + self._field(ahead) + 2.0 * pulled)
         self._now = (self._now + 1) % len(self._past)
         self._z = self._past[self._now] = z
-        self._rates[self._now] = self._field(z) + pulled - decay * z
+        self._rate = self._field(z) + pulled - decay * z
 
     def _samples(self) -> Complex:
         """What each leg hears of each other, (count, N, N)."""
         at = ((self._now - (0 if self._late else 1) * self._age) % len(self._past), *self._of)
-        samples = self._past[at]
-        if self._carried:
-            samples = samples + self._rates[at] * (self._age * self._step)
-        return np.asarray(samples)
+        return np.asarray(self._past[at] * self._turned(self._age))
+
+    def _turned(self, age: NDArray[np.int_]) -> Complex:
+        """What samples (count, N, ...) of such ages are turned by at their receivers."""
+        if not self._carried:
+            return np.ones(1, dtype=complex)
+        ended = np.maximum(self._inside, 0)[:, :, None] * (self._kind == 'carried')
+        free = np.maximum(0, age - ended)
+        return np.asarray(np.exp(1j * self._capture.omega * self._step * free))
 
     def _field(self, z: Complex) -> Complex:
         """ż without any pull."""
         r = self._capture.radius
         return np.asarray((self._rho * (r * r - np.abs(z) ** 2) + 1j * self._capture.omega) * z)
 
-    def note_speed(self, tick: int) -> None:
-        """Note the largest |ż| of each quarter of the run."""
-        quarter = self._fastest[4 * tick // self.steps]
-        np.maximum(quarter, np.abs(self._rates[self._now]).max(axis=1), out=quarter)
+    def note_way(self, tick: int) -> bool:
+        """Note the largest distance from where each quarter of the run began; whether it is over.
+        """
+        quarter = 4 * (tick % self.steps) // self.steps
+        if quarter != 4 * ((tick - 1) % self.steps) // self.steps:
+            self._from, self._farthest[quarter] = self._z, 0.0
+        np.maximum(self._farthest[quarter], np.abs(self._z - self._from).max(axis=1),
+                   out=self._farthest[quarter])
+        return (tick + 1) % self.steps == 0
 
     @property
     def moves(self) -> NDArray[np.bool_]:
-        """Whether something moves in the last quarter as it did before, (count,)."""
-        second, last = self._fastest[1], self._fastest[3]
-        return np.asarray((last > 0.9 * second)
-                          & (last > 1e-3 * self._capture.omega * self._capture.radius))
+        """Whether something moves in the last quarter as far as it did before, (count,)."""
+        second, last = self._farthest[1], self._farthest[3]
+        return np.asarray((last > 0.9 * second) & (last > 1e-3 * self._capture.radius))
 
 
-def chosen_ages(away: Complex, past: Complex, rates: Complex, now: int, most: NDArray[np.int_],
-                step: float, age: NDArray[np.int_]) -> NDArray[np.int_]:
+def chosen_ages(away: Complex, past: Complex, now: int, most: NDArray[np.int_],
+                age: NDArray[np.int_], turned: Callable[[NDArray[np.int_]], Complex]
+                ) -> NDArray[np.int_]:
     """Ages of the samples that pull each node farthest away from the target now, of those that do
     not come before the last that it had, (count, N, N).
 
@@ -168,31 +206,27 @@ def chosen_ages(away: Complex, past: Complex, rates: Complex, now: int, most: ND
     ----------
     away : ndarray (count, N)
         From the target to the nodes.
-    past, rates : ndarray (length, count, N)
-        States by tick, a ring, and what carries them on [1/s].
+    past : ndarray (length, count, N)
+        States by tick, a ring.
     now : int
         Where the present is in it.
     most : ndarray (count,)
         Largest ages in ticks.
-    step : float
-        Length of a tick [s].
     age : ndarray (count, N, N)
         Ages at the last tick.
+    turned : callable
+        Ages in ticks (count, N, ...) to what receivers turn samples by, as complex numbers.
     """
     length, count, row = len(past), len(away), np.arange(len(away))[:, None]
     age = age + 1
     shares = np.minimum(np.linspace(0.0, 1.0, _CHOICES), 1.0)
     ages = np.round(shares * most[:, None]).astype(int)                    # (count, choices)
-    at = (now - ages) % length
-    seen = past[at, row] + rates[at, row] * (ages * step)[:, :, None]       # (count, choices, N)
-    out = away / np.maximum(np.abs(away), 1e-12)
-    worth = np.einsum('bi,bcj->bcij', out.real, seen.real) + np.einsum(
-        'bi,bcj->bcij', out.imag, seen.imag)
+    seen = past[(now - ages) % length, row]                                # (count, choices, N)
+    out = np.conj(away / np.maximum(np.abs(away), 1e-12))[:, :, None]
+    worth = np.einsum('bic,bcj->bcij', out * turned(ages[:, None, :]), seen).real
     worth[ages[:, :, None, None] > age[:, None]] = -np.inf
-    cell = row[:, :, None], np.arange(age.shape[2])
-    old = past[(now - age) % length, cell[0], cell[1]] + rates[
-        (now - age) % length, cell[0], cell[1]] * (age * step)
-    kept = np.where(age > most[:, None, None], -np.inf, (np.conj(out)[:, :, None] * old).real)
+    old = past[(now - age) % length, row[:, :, None], np.arange(age.shape[2])] * turned(age)
+    kept = np.where(age > most[:, None, None], -np.inf, (out * old).real)
     best = worth.argmax(axis=1)
     better = np.take_along_axis(worth, best[:, None], axis=1)[:, 0] > kept
     return np.where(better, ages[np.arange(count)[:, None, None], best], age)

@@ -7,7 +7,8 @@ suite at slow and fast cadences with weak and strong gains, and random networks.
 age, of other ages on each edge, kept until they are that old, on all edges or those from the
 inhibited nodes, or chosen at each moment on each edge as those that pull farthest away; the states
 before the capture turn as fast as such samples let them. Where a leg turned backwards within that
-age before the entry nothing is certified. Ages of states that are held reach to a turn.
+age before the entry nothing is certified. Ages of samples, held or carried on, reach to a
+turn, or to 0.3 s.
 """
 
 from __future__ import annotations
@@ -16,7 +17,6 @@ import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import product
 
 import numpy as np
@@ -34,22 +34,22 @@ from dmp_cpg_ros.core.contraction import delays
 from dmp_cpg_ros.core.contraction.capture import capture_set, place_tolerance, radius_tolerance
 from dmp_cpg_ros.core.contraction.delays import Capture
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
-from dmp_cpg_ros.paper.carried_slowly import slowly_carried_margin
 from dmp_cpg_ros.studies.delayed_runs import PATTERNS, fails
 from dmp_cpg_ros.studies.draws import both_ways, random_edges
 from dmp_cpg_ros.studies.output import markdown_table
 
 MARGINS: dict[str, Callable[[Capture], float]] = {
-    'late': delays.late_margin, 'held': delays.held_margin, 'carried': delays.carried_margin,
-    'steady': partial(slowly_carried_margin, omega_rate=0.0)}
-"""Kinds of delay, and what is certified: ``carried`` for an ω that may jump, ``steady`` for one
-that stands still."""
+    'late': delays.late_margin, 'held': delays.held_margin, 'carried': delays.carried_margin}
+"""Kinds of delay, and what is certified."""
 
 AGES = 0.999 * 1.2 ** np.arange(-1, 15)
 """Ages that are tried, in units of the certified one."""
 
 COLUMNS = ('delay', 'networks', 'none certified', 'nothing fails', 'share of what fails: least',
            'median', 'most')
+
+MOST_AGE = 0.3
+"""Largest age of samples that is tried where any is certified, if a turn takes longer [s]."""
 
 _BETWEEN = 8  # ages from the last that works to the first that fails
 
@@ -104,12 +104,10 @@ def measured(networks: int, seed: int, kinds: Sequence[str] = tuple(MARGINS)) ->
     rng = np.random.default_rng(seed)
     cases = [*gait_captures(), *random_captures(rng, networks)]
     for name, capture in cases:
-        certified = {kind: margin(capture) for kind, margin in MARGINS.items()}
-        found = {kind: failing_age(capture, kind, certified[kind], rng)
-                 if certified[kind] > 0.0 else np.inf
-                 for kind in {'steady' if kind == 'carried' else kind for kind in kinds}}
+        certified = {kind: MARGINS[kind](capture) for kind in kinds}
         for kind in kinds:
-            yield Row(kind, name, certified[kind], found['steady' if kind == 'carried' else kind])
+            yield Row(kind, name, certified[kind], failing_age(capture, kind, certified[kind], rng)
+                      if certified[kind] > 0.0 else np.inf)
 
 
 def gait_captures() -> Iterator[tuple[str, Capture]]:
@@ -158,12 +156,12 @@ def capture_of(graph: CouplingGraph, rho: float, radius: float, omega: float, re
 def failing_age(capture: Capture, kind: str, certified: float, rng: np.random.Generator
                 ) -> float:
     """Smallest age at which a pattern fails, of ``AGES`` times the certified one and then of some
-    between; of states that are held up to a turn, from 2 ms on where every age is certified [s].
+    between; but of samples up to a turn or ``MOST_AGE``, from 4 ms on where any is certified [s].
     """
     ages = np.asarray(certified * AGES, dtype=float)
-    if kind == 'held':
-        first = 0.999 * certified if np.isfinite(certified) else 2e-3
-        ages = np.geomspace(first, max(2.0 * first, 2.0 * np.pi / capture.omega), len(AGES))
+    if kind != 'late':
+        first, turn = 0.999 * certified if np.isfinite(certified) else 4e-3, 2.0 * np.pi
+        ages = np.geomspace(first, max(2.0 * first, min(turn / capture.omega, MOST_AGE)), 8)
     patterns = ('one age', 'kept') if kind == 'late' else PATTERNS
     failed = {pattern: fails(capture, kind, ages, pattern, rng) for pattern in patterns}
     first = int(np.argmax(np.any(list(failed.values()), axis=0)))

@@ -10,9 +10,10 @@ in any way, the distances from the target obey in locked coordinates
 This is a comparison system with no negative feedback that is late: a box is invariant when it is
 without delay and the samples lie in it too (Halanay's inequality; Smith 1995, *Monotone Dynamical
 Systems*, chapter 5), and differences of solutions vanish whenever those of the undelayed system
-do. What limits d are the samples from before the capture and, where states are carried on by
-ẋ times their age, ŷ_j = (1 − d (Σ_l k_jl + α_j)) y_j + d (F(y_j) + Σ_l k_jl ŷ_l + α_j y_d), which
-leads out of the box; without damping from 1/λ_max(k) on, where the equation is not stable at all.
+do. What limits d are the samples from before the capture. Held as they are they lag; carried on by
+the flow of the gait, ŷ_j = e^(iφ) y_j with φ the turn of ω over the age until the receiver came into
+C, they do not: that is where the free flow ends, and every solution of the gait, walking and at
+rest, is one of the network with delays.
 """
 
 from __future__ import annotations
@@ -37,8 +38,7 @@ from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian, s
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 
-ROUNDS = 7  # of a bisection
-PRESENT, ENTRY, CARRIED = range(3)  # what the largest sample is of
+_ROUNDS = 7  # of a bisection
 _ROOM = 1.02  # factor on distances for which what grows with them is taken
 
 
@@ -155,8 +155,7 @@ def late_margin(capture: Capture) -> float:
     room = min(2.0 * capture.places, float(found.distance[~capture.held].min(initial=inf)) - r0)
     inwards = degree * room**2 / (2.0 * r)                                   # of radii [1/s]
     off = capture.radii + inwards * 4.0 * asin(min(1.0, r0 / (2.0 * r))) / omega
-    arc = min(2.0 * acos(min(1.0, max(-1.0, (R * R + r * r - r0 * r0) / (2.0 * R * r))))
-              for R in (max(r - off, 1e-9), r + off))
+    arc = min(_arc(r, R, r0) for R in (max(r - off, 1e-9), r + off))
     crossing = (arc - 2.0 * asin(min(1.0, capture.places / (2.0 * max(r - off, 1e-9))))) / omega
 
     def bears(delay: float) -> bool:
@@ -211,45 +210,45 @@ def held_margin(capture: Capture) -> float:
 
 
 def carried_margin(capture: Capture) -> float:
-    """Largest age of samples ŷ_j = y_j(t − d) + d ẏ_j(t − d) with which capture holds [s].
+    """Largest age d of samples carried on by the flow of the gait with which capture holds [s].
+
+    ŷ_j = e^(iφ) y_j(t − d), where φ is what ω turns by over the age, but for the part of it after
+    the receiver itself came into C with inhibition armed. All nodes come there at about one time:
+    older samples are then where their nodes were at that time, in their places, and lag by nothing,
+    and younger ones are as they were taken, as without an age.
 
     Parameters
     ----------
     capture : Capture
-        What is to be captured, by nodes that for twice as long before were in their places and
-        turned no faster than ω.
+        What is to be captured, by nodes that for as long before were within half of ``places`` of
+        each other in the frame that turns with ω, came into C from outside, and knew inhibition to
+        be armed then.
 
     Returns
     -------
     float
-        0 without a certificate; below :func:`longest_carried`, and at most a quarter of a turn.
+        0 without a certificate, infinite otherwise: capture does not depend on the age.
     """
-    if not capture.undelayed.holds:
+    r, r0, p, held = capture.radius, capture.region_radius, capture.places, capture.held
+    if not (capture.undelayed.holds and capture.contracts(p) and capture.radii < r):
         return 0.0
-    return _longest(lambda age: _carries(capture, age), most_carried(capture))
+    crossed = min(_arc(r, R, r0) * R for R in (r - capture.radii, r + capture.radii))
+    pull = float(capture.coupling[:, held].sum(axis=1).max()) * p
+    borne = capture.outweighs(pull, p) or r0 + p <= _largest_box(capture)[0]
+    return inf if borne and crossed >= 4.0 * p else 0.0
 
 
-def most_carried(capture: Capture) -> float:
-    """Age from which on nothing is certified of carried samples [s]."""
-    return min(longest_carried(capture.system), 0.5 * pi / max(abs(capture.omega), 1e-3))
-
-
-def longest_carried(system: CanonicalSystem) -> float:
-    """1/λ_max(k), the age from which on states that are carried on by ẋ times a constant age
-    oscillate ever faster [s].
-
-    ẏ_i − d Σ_j k_ij ẏ_j(t − d) is the difference operator of a neutral equation, which is not
-    stable for λ_max(k) d ≥ 1 (Hale & Verduyn Lunel 1993, chapter 9).
-    """
-    L = comparison_laplacian(system.graph)
-    return 1.0 / max(float(np.abs(np.linalg.eigvals(np.diag(np.diag(L)) - L)).max()), 1e-300)
+def _arc(radius: float, R: float, region_radius: float) -> float:
+    """Arc of the circle |x| = R that lies in C [rad]."""
+    cosine = (R * R + radius * radius - region_radius**2) / (2.0 * R * radius)
+    return 2.0 * acos(min(1.0, max(-1.0, cosine)))
 
 
 def _longest(bears: Callable[[float], bool], most: float) -> float:
     """Longest delay that is borne, not above ``most``; 0 when there is none [s]."""
     if not most > 0.0:
         return 0.0
-    return most if bears(most) else last_that_holds(bears, 0.0, most, ROUNDS)
+    return most if bears(most) else last_that_holds(bears, 0.0, most, _ROUNDS)
 
 
 def _largest_box(capture: Capture) -> tuple[float, float]:
@@ -279,72 +278,3 @@ def _least_room(room: Array, k: Array) -> float:
     """Smallest of rooms (M,) over the sums of couplings (M, N); a node that feels none has any."""
     degree = k.sum(axis=1)
     return float(np.divide(room, degree, out=np.full(len(room), inf), where=degree > 0.0).min())
-
-
-def _carries(capture: Capture, age: float) -> bool:
-    """Whether box and contraction have room for carried samples of an age."""
-    system, r, r0, omega = capture.system, capture.radius, capture.region_radius, capture.omega
-    k, held, rho = capture.coupling, capture.held, float(capture.system.rho.max())
-    degree, size = k.sum(axis=1), len(k)
-    kept, bent = 1.0 - age * (degree + capture.gains), 0.5 * r * (omega * age) ** 2
-    off = float(degree.max()) * (capture.places + bent) + 3.0 * rho * r**2 * capture.radii
-    beyond = bent + 2.0 * age * off + capture.places * (np.count_nonzero(held) > 1)
-    aside = capture.outweighs(float(k[:, held].sum(axis=1).max()) * beyond, beyond, beyond)
-    entry = np.where(held & aside, r0, r0 + capture.places + bent + 2.0 * age * off)
-    u, choice = capture.undelayed.distance, np.where(held, CARRIED, PRESENT)
-    for _ in range(8):
-        least, most = u / _ROOM, u * _ROOM
-        out = capture.growth_out(most)
-        way = age * np.hypot(omega * (r + most), rho * np.maximum(
-            0.385 * r**3, (2.0 * r + most) * most * (r + most)))          # d |F|
-        along = np.abs(kept) * least + np.where(kept >= 0.0, age * out, way)
-        more = np.hypot(np.maximum(along, way), way) - np.abs(kept) * least
-        more += age * beyond * aside * k[:, held].sum(axis=1)
-        bound = largest_samples(k, age, degree, np.where(held, r0, out), np.abs(kept), more,
-                                entry, held, choice)
-        if bound is None or bound[0].max() > 10.0 * r:
-            return False
-        u, samples, choice = bound
-        if np.all(u <= most) and np.all(u >= least):
-            break
-    else:
-        return False
-    if not np.all(capture.room(k @ samples - degree * r0) > 0.0):
-        return False
-    reach, turned, none = 2.0 * rho * (r + u) ** 2, age * omega, np.zeros(size)
-    grows = growth(system.rho, system.radius, np.maximum(0.0, r - u))
-    norm = np.sqrt(np.maximum(np.abs(kept + age * grows), np.abs(kept - 1.5 * age * reach)) ** 2
-                   + turned**2 + turned * age * reach)                     # |(1 - dk) I + d A|
-    return largest_samples(k, age, degree + capture.gains - grows, none + 1.0, norm, none, none,
-                           none > 0.0, np.full(size, PRESENT)) is not None
-
-
-def largest_samples(k: Array, age: float, decay: Array, fed: Array, kept: Array, more: Array,
-                    entry: Array, given: NDArray[np.bool_], choice: NDArray[np.int_]
-                    ) -> tuple[Array, Array, NDArray[np.int_]] | None:
-    """Least u > 0 and û with decay u = fed + k û (u = fed where it is given) and
-    û = max(u, entry, kept u + more + age k û), found by improving the choice of the largest; None
-    when there is none, as no solution with a Z-matrix is positive that is not stable.
-    """
-    size, unit, none, every = len(k), np.eye(len(k)), 0.0 * k, np.arange(len(k))
-    matrix = np.empty((2 * size, 2 * size))
-    matrix[:size] = np.where(given[:, None], np.hstack([unit, none]),
-                             np.hstack([np.diag(decay), -k]))
-    rows = np.stack([np.hstack([-unit, unit]), np.hstack([none, unit]),
-                     np.hstack([-np.diag(kept), unit - age * k])])
-    right = np.stack([0.0 * entry, entry, more])
-    for _ in range(3 * size):
-        matrix[size:] = rows[choice, every]
-        try:
-            x = np.linalg.solve(matrix, np.concatenate([fed, right[choice, every]]))
-        except np.linalg.LinAlgError:
-            return None
-        if not (np.all(np.isfinite(x)) and np.all(x > 0.0)):
-            return None
-        u, samples = x[:size], x[size:]
-        options = np.stack([u, entry, kept * u + more + age * (k @ samples)])
-        better = options.max(axis=0) > options[choice, every] * (1.0 + 1e-12)
-        if not better.any():
-            return u, samples, choice
-        choice = np.where(better, options.argmax(axis=0), choice)
-    return None
