@@ -8,6 +8,7 @@ certificate and the studies run with the numbers of the nodes.
 
 from __future__ import annotations
 
+import glob
 import os
 import re
 import stat
@@ -36,6 +37,9 @@ ROBOTS, SCENARIOS, MOTIONS, POLICIES = 'robots', 'scenarios', 'motions', 'polici
 
 LARGEST_FILE = 2**18
 """Longest file that is read [B]."""
+
+_PROCESSES = Path('/proc')
+"""Where Linux has a folder for every process that runs."""
 
 SHORT = 2**15
 """Texts whose parse is kept are shorter [characters]."""
@@ -145,7 +149,7 @@ def writable(path: str | Path) -> Path:
 def replacing(path: str | Path) -> Iterator[Path]:
     """File to write that takes the place of a path when it is whole; what is there stays until
     then. What is no file, such as ``/dev/stdout``, is written itself; errors are as of
-    :func:`writable`.
+    :func:`writable`. What a process that was killed has left of the same file is removed.
     """
     path = writable(path)
     if path.exists() and not path.is_file():
@@ -153,11 +157,20 @@ def replacing(path: str | Path) -> Iterator[Path]:
         return
     path = path.resolve()
     new = path.with_name(f'.{os.getpid()}.{path.name}')  # its ending may say what it is to be
+    _remove_left(path)
     try:
         yield new
         os.replace(new, path)
     finally:
         new.unlink(missing_ok=True)
+
+
+def _remove_left(path: Path) -> None:
+    """Remove what processes that do not run any more have begun instead of a file."""
+    for left in path.parent.glob(f'.*.{glob.escape(path.name)}'):
+        writer = left.name[1:-len(path.name) - 1]
+        if writer.isdecimal() and _PROCESSES.is_dir() and not (_PROCESSES / writer).exists():
+            left.unlink(missing_ok=True)
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:

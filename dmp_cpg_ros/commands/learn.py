@@ -13,7 +13,12 @@ from time import perf_counter
 import numpy as np
 
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration
-from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.commands.ros_arguments import (
+    RosArguments,
+    number,
+    run_command,
+    within,
+)
 from dmp_cpg_ros.commands.walked_motion import read_motion
 from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.errors import DataError, ParameterError
@@ -43,6 +48,12 @@ examples:
 """
 
 
+PERIODS, RIDGES, OVERLAPS = (1e-3, 1e4), (0.0, 1e3), (1e-3, 0.999)
+"""Least and largest numbers that may be asked for: periods [s]; shares."""
+
+DAMPINGS, STIFFNESSES = (1e-3, 1e6), (1e-6, 1e12)
+"""The same of the spring [1/s], [1/s^2]; those of critical springs belong together."""
+
 _NOT_OF_A_WALK = ('out', 'kind', 'period', 'joints', 'start', 'end', 'positions_only', 'method',
                   'ridge', 'overlap', 'form')
 
@@ -66,22 +77,26 @@ def _parser() -> argparse.ArgumentParser:
     add('--kind', choices=('discrete', 'rhythmic'), default='discrete', help='default: discrete')
     add('--bases', type=_bases, default=25,
         help="number of bases, or 'auto' to choose it by the held-out error (default: 25)")
-    add('--period', metavar='S', type=float, help='period of a rhythm (default: found from data)')
+    add('--period', metavar='S', type=within(*PERIODS),
+        help='period of a rhythm [s], {:g} to {:g} (default: found from data)'.format(*PERIODS))
     add('--joints', metavar='A,B', type=_words, default=(), help='joints to take (default: all)')
     add('--topic', help='topic of a bag (default: joint_states; joint_targets for --motion)')
-    add('--start', metavar='S', type=float, help='take samples from here on, after the first [s]')
-    add('--end', metavar='S', type=float, help='take samples up to here, after the first [s]')
+    add('--start', metavar='S', type=number, help='take samples from here on, after the first [s]')
+    add('--end', metavar='S', type=number, help='take samples up to here, after the first [s]')
     add('--positions-only', action='store_true', help='leave recorded derivatives aside')
     add('--method', choices=METHODS, default=METHODS[0], help='what is fitted: '
         'response, the movement that the weights cause (default); joint, the force that it needs, '
         'all bases at once; local, the same force, each basis by itself')
-    add('--ridge', type=float, default=FitOptions.ridge, metavar='R',
-        help='regularisation of the weights, relative to the mean square of their regressors '
-        '(default: %(default)g)')
-    add('--overlap', type=float, metavar='SHARE', help='value of a basis at the centre of its '
-        'neighbour, between 0 and 1 (default: suits kind and method)')
-    add('--stiffness', metavar='K', type=float, help='[1/s^2] (default: suits the duration)')
-    add('--damping', metavar='B', type=float, help='[1/s] (default: critical)')
+    add('--ridge', type=within(*RIDGES), default=FitOptions.ridge, metavar='R',
+        help='regularisation of the weights, relative to the mean square of their regressors, '
+        '{:g} to {:g} (default: %(default)g)'.format(*RIDGES))
+    add('--overlap', type=within(*OVERLAPS), metavar='SHARE',
+        help='value of a basis at the centre of its neighbour, {:g} to {:g} (default: suits kind '
+        'and method)'.format(*OVERLAPS))
+    add('--stiffness', metavar='K', type=within(*STIFFNESSES),
+        help='[1/s^2], {:g} to {:g} (default: suits the duration)'.format(*STIFFNESSES))
+    add('--damping', metavar='B', type=within(*DAMPINGS),
+        help='[1/s], {:g} to {:g} (default: critical)'.format(*DAMPINGS))
     add('--form', choices=FORMS, default=FORMS[0], help='reading of tau (default: scaled)')
     return parser
 

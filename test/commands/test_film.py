@@ -5,12 +5,17 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import subprocess
+import sys
 from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from dmp_cpg_ros import __file__ as package
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 from dmp_cpg_ros.commands.film import Shot, checked_film_path, film, has_encoder, main, write_film
@@ -19,6 +24,9 @@ from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.robot.camera import Camera
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies.loop_recording import recording_of
+
+PACKAGES = Path(package).resolve().parents[1]
+"""Where processes find the package."""
 
 SMALL = Shot(fps=10.0, width=160, height=90)
 
@@ -91,6 +99,40 @@ def test_a_film_that_is_interrupted_leaves_what_was_there(tmp_path):
         write_film(path, broken(), [frame], 5.0)
     assert [of.name for of in tmp_path.iterdir()] == ['film.gif']
     assert path.read_bytes() == b'an earlier film'
+
+
+BEGUN = """
+import sys
+from dmp_cpg_ros.configuration import replacing
+with replacing(sys.argv[1]) as new:
+    new.write_bytes(b'a part')
+    print('begun', flush=True)
+    sys.stdin.read()
+"""
+"""A writer that waits in the middle of a file."""
+
+
+def test_a_film_takes_away_what_a_killed_one_has_left_and_nothing_of_others(tmp_path):
+    path, frame = tmp_path / 'film.gif', np.full((48, 64, 3), 100, dtype=np.uint8)
+    names = {'film.gif', '.99999999.other.gif', '.99999999.my.film.gif', '.backup.film.gif'}
+    writers = []
+    for name in names:
+        (tmp_path / name).write_bytes(b'')
+    for _ in range(2):
+        writers.append(subprocess.Popen(
+            [sys.executable, '-c', BEGUN, str(path)], stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, env={**os.environ, 'PYTHONPATH': str(PACKAGES)}))
+        assert writers[-1].stdout.readline() == b'begun\n'
+    killed, running = writers
+    killed.kill()
+    killed.wait()
+    begun = [f'.{writer.pid}.film.gif' for writer in writers]
+    assert {of.name for of in tmp_path.iterdir()} == {*names, *begun}
+    write_film(path, iter([frame]), [frame], 5.0)
+    assert {of.name for of in tmp_path.iterdir()} == {*names, begun[1]}
+    running.communicate()
+    assert {of.name for of in tmp_path.iterdir()} == names
+    assert path.read_bytes() == b'a part'
 
 
 def test_it_is_told_how_far_a_film_is(glide, tmp_path):

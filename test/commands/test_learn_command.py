@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from demonstrations import joint_angles, walking_joints
 
-from dmp_cpg_ros.commands import walked_motion
+from dmp_cpg_ros.commands import learn, walked_motion
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration
 from dmp_cpg_ros.commands.learn import main
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
@@ -260,13 +260,10 @@ def test_unknown_joints_and_topics_are_answered_with_the_known_ones(tmp_path, ca
 
 
 def test_what_has_no_rhythm_is_refused(tmp_path, capsys):
-    path = write_csv(tmp_path / 'still.csv', REACH, derived=False)
     noise = np.random.default_rng(0).normal(size=(200, 1))
     np.save(tmp_path / 'noise.npy', np.hstack([np.arange(200.0)[:, None], noise]))
     out = str(tmp_path / 'out.yaml')
     assert main([str(tmp_path / 'noise.npy'), '--kind', 'rhythmic', '--out', out]) == BAD_INPUT
-    assert 'period' in capsys.readouterr().err
-    assert main([str(path), '--kind', 'rhythmic', '--period', '-1', '--out', out]) == BAD_INPUT
     assert 'period' in capsys.readouterr().err
 
 
@@ -288,6 +285,50 @@ def test_arguments_that_mean_nothing_end_with_status_2(arguments):
     with pytest.raises(SystemExit) as stopped:
         main(['a.csv', '--out', 'b.yaml', *arguments])
     assert stopped.value.code == BAD_INPUT
+
+
+@pytest.mark.parametrize(('option', 'value', 'valid'), [
+    ('--ridge', 'nan', 'finite'), ('--ridge', '-1', 'from 0 to 1000'), ('--ridge', 'x', 'number'),
+    ('--overlap', 'nan', 'finite'), ('--overlap', '1', 'from 0.001 to 0.999'),
+    ('--overlap', '0', 'from 0.001 to 0.999'), ('--stiffness', 'inf', 'finite'),
+    ('--stiffness', '0', 'from 1e-06 to 1e+12'), ('--damping', 'nan', 'finite'),
+    ('--damping', '1e-300', 'from 0.001 to 1e+06'), ('--damping', '-40', 'from 0.001 to 1e+06'),
+    ('--period', '1e-300', 'from 0.001 to 10000'), ('--period', '-1', 'from 0.001 to 10000'),
+    ('--period', 'nan', 'finite'),
+    ('--start', 'nan', 'finite'), ('--end', 'inf', 'finite')])
+def test_numbers_that_nothing_can_be_learned_with_are_refused(capsys, option, value, valid):
+    for target in ('--out', '--motion'):
+        with pytest.raises(SystemExit) as stopped:
+            main(['a.csv', target, 'b.yaml', option, value])
+        assert stopped.value.code == BAD_INPUT
+        told = capsys.readouterr().err
+        assert f'argument {option}: ' in told and valid in told
+
+
+@pytest.mark.parametrize('options', [
+    ['--damping', str(learn.DAMPINGS[0])], ['--damping', str(learn.DAMPINGS[1])],
+    ['--stiffness', str(learn.STIFFNESSES[0])], ['--stiffness', str(learn.STIFFNESSES[1])],
+    ['--ridge', str(learn.RIDGES[1])], ['--overlap', str(learn.OVERLAPS[0])],
+    ['--overlap', str(learn.OVERLAPS[1])]], ids=' '.join)
+def test_numbers_at_the_ends_of_their_ranges_learn_something_or_say_why_not(
+        tmp_path, capsys, options):
+    path, out = write_csv(tmp_path / 'reach.csv', REACH), tmp_path / 'reach.yaml'
+    status = main([str(path), '--out', str(out), *options])
+    told = capsys.readouterr().err
+    assert (status, told) == (0, '') if out.exists() else (
+        status == BAD_INPUT and told.count('\n') == 1)
+    assert not out.exists() or np.isfinite(load_primitive(out).transformation.stiffness).all()
+
+
+def test_an_overlap_and_a_damping_reach_the_primitive(tmp_path):
+    path = write_csv(tmp_path / 'reach.csv', REACH)
+    narrow, wide = tmp_path / 'narrow.yaml', tmp_path / 'wide.yaml'
+    for out, overlap in ((narrow, '0.1'), (wide, '0.9')):
+        assert main([str(path), '--out', str(out), '--overlap', overlap, '--damping', '30']) == 0
+    widths = [load_primitive(out).bases.widths for out in (narrow, wide)]
+    assert (widths[0] != widths[1]).all()
+    np.testing.assert_allclose(load_primitive(narrow).transformation.damping, 30.0)
+    np.testing.assert_allclose(load_primitive(narrow).transformation.stiffness, 225.0)
 
 
 def test_a_motion_needs_the_recording_of_a_walk(tmp_path, capsys):
