@@ -14,8 +14,10 @@ from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
 DRIFT_SHARE = 0.03
-"""Deviation of the position per length of the way that led there, one of dead reckoning. On the
-flat it is off by up to 0.005 of the way, and by 0.013 upwards; feet that slide cost more.
+"""Deviation of the position per length of the way that led there, one of dead reckoning. It is a
+constant, no filter's: more than twice the errors that runs of the package's own robot ended with,
+by ``estimation.position_error_share`` and ``z_error_share`` of ``metrics.json`` (0.011 and 0.012
+at most; doc/architecture.md has the commands). Other robots and grounds may err by more.
 """
 
 
