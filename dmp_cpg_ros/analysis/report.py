@@ -77,6 +77,9 @@ UNITS = {'_m_s': 'm/s', '_s': 's', '_m': 'm', '_n': 'N'}
 CSS, SCRIPT = (Path(__file__).with_suffix(kind).read_text(encoding='utf-8')
                for kind in ('.css', '.js'))
 
+ZOOM = 'drag or click to enlarge; a double click shows all'
+"""What can be done with a figure."""
+
 FOLDED = ('Steady speeds', 'Metrics', 'Injected failures', 'Certificate', 'Manifest')
 """Sections that are opened by a click."""
 
@@ -159,8 +162,8 @@ def _figure(png: Path, title: str, caption: str = '') -> str:
     """Picture with title and caption; the URI carries the picture itself."""
     data = base64.b64encode(png.read_bytes()).decode('ascii')
     words = f'<b>{escape(title)}.</b> {escape(caption)}' if caption else escape(title)
-    return (f'<figure><div><img alt="{escape(title)}" src="data:image/png;base64,{data}" '
-            f'title="click to enlarge"></div><figcaption>{words}</figcaption></figure>')
+    return (f'<figure><div class="zooms" title="{ZOOM}"><img alt="{escape(title)}" '
+            f'src="data:image/png;base64,{data}"></div><figcaption>{words}</figcaption></figure>')
 
 
 def _records(records: Sequence[Mapping[str, Any]], note: str = '') -> str:
