@@ -30,7 +30,7 @@ EXECUTABLES = (
     'ros2_control_driver',
     # The commands.
     'walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client', 'live_view',
-    'composed_suite', 'study_stops', 'benchmark_walking', 'study_recovery',
+    'composed_suite', 'low_level_robot', 'study_stops', 'benchmark_walking', 'study_recovery',
 )
 
 WRAPPER = """\

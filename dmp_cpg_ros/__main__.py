@@ -24,7 +24,7 @@ from dmp_cpg_ros import __version__
 PACKAGE = 'dmp_cpg_ros'
 
 COMMANDS = ('walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client',
-            'live_view', 'composed_suite')
+            'live_view', 'composed_suite', 'low_level_robot')
 STUDIES = ('study_stops', 'benchmark_walking', 'study_recovery')
 """Executables that are no nodes; those that are stand in :mod:`dmp_cpg_ros.suite_table`."""
 

@@ -45,6 +45,10 @@ INTERRUPTED = 130
 DRIVING = ('cmd_vel', 'teleop', 'joystick')
 """Commands whose last command is zero, whatever ends them."""
 
+SWITCHES = {'inhibit': ('inhibit', True), 'resume': ('inhibit', False),
+            'enable': ('~/enable', True), 'disable': ('~/enable', False)}
+"""Commands that are either side of a service."""
+
 ENDLESS = (*DRIVING, 'echo')
 """Commands that Ctrl-C ends as it should."""
 
@@ -66,10 +70,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def request(client: SuiteClient, options: argparse.Namespace) -> None:
-    """Inhibit or resume the gait, stand up, lie down or recover; a refusal is an error."""
-    stop = {'inhibit': True, 'resume': False}.get(options.command)
-    answer = (client.call(options.command, Trigger.Request()) if stop is None else
-              client.call('inhibit', SetBool.Request(data=stop)))
+    """Inhibit or resume the gait, stand up, lie down or recover, let the driver command the joints
+    or not; a refusal is an error.
+    """
+    service, on = SWITCHES.get(options.command, (options.command, None))
+    answer = client.call(service, Trigger.Request() if on is None else SetBool.Request(data=on))
     if not answer.success:
         raise ClientError(answer.message)
     print(answer.message)
@@ -223,6 +228,8 @@ COMMANDS: tuple[tuple[str, Callable[..., None], str, tuple[_Argument, ...]], ...
         _takes('--for', metavar='SECONDS', dest='seconds', type=positive, default=math.inf,
                help='end after so long'), *_sending())),
     ('inhibit', request, 'stop the gait', ()), ('resume', request, 'start the gait', ()),
+    ('enable', request, 'let ros2_control_driver command the joints', ()),
+    ('disable', request, 'let it follow the legs no more: the robot looks after itself', ()),
     *((name, request, interface(name).meaning, ()) for name in REQUESTS),
     ('push', push, 'push the simulated robot for 0.1 s', (
         _takes('force', metavar='F', type=number, nargs=3, help='forward, to the left, up [N]'),)),

@@ -32,7 +32,12 @@ from dmp_cpg_ros.nodes.framework.execution import (
 )
 from dmp_cpg_ros.nodes.framework.strangers import Strangers
 from dmp_cpg_ros.nodes.messages.commands import twist
-from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, Interface, interface
+from dmp_cpg_ros.nodes.messages.interfaces import (
+    STAMPED_CMD_VEL,
+    Interface,
+    interface,
+    private,
+)
 
 ASK_AGAIN_S = 0.3
 """Time after which a request that may be repeated is repeated [s]."""
@@ -101,6 +106,8 @@ class SuiteClient:
     def call(self, name: str, request: Any) -> Any:
         """Answer of a service of the suite; asked once."""
         service = interface(name)
+        if name.startswith('~'):
+            service = private(name, *service.publishers)
         client = self.node.create_client(service.type, service.name)
         self.meet(service.publishers, client)
         return self.answer([client.call_async(request)], client.service_name)

@@ -123,6 +123,11 @@ class Ros2ControlDriver(DrivenRobot):
         self._enabled = self._commanding = False
         self.destroy_timer(self._timer)
 
+    @property
+    def keeps_velocity(self) -> bool:
+        """Whether motors take a velocity beside the angle, with each command."""
+        return {'position', 'velocity'} <= set(self._joint_publishers)
+
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Timing, and whether the joints are commanded and follow the legs."""
         return {**self._timing.values(), 'enabled': self._enabled, 'commanding': self._commanding,

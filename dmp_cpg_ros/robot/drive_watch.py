@@ -62,6 +62,9 @@ class DriveWatch:
     ----------
     watches : bool
         Whether there are drives that can be judged.
+    keeps_velocity : bool
+        Whether drives go on with a velocity that they are told again with the same angle, as
+        motors do that are told both at a rate of their own; those of the simulator stop there.
     failing : tuple of str
         Joints, by the robot's names, that do not follow or did not lately.
     limp : bool
@@ -78,7 +81,7 @@ class DriveWatch:
         self._goes = np.zeros(len(self._names))  # velocities that the drives still follow
         self._told_ns = 0
         self._reports = False
-        self.watches = True
+        self.watches, self.keeps_velocity = True, False
         self._failed_ns = np.full(len(self._names), -WELL_NS)
         self.failing: tuple[str, ...] = ()
         # Means over squared limits: τ* by both laws, friction, τ; τ*² by both (the second first),
@@ -91,7 +94,8 @@ class DriveWatch:
     def tell(self, time_ns: int, targets: JointTargets) -> None:
         """Keep what the joints are told at a stamp [ns]."""
         told, last = np.array((targets.position, targets.velocity, targets.effort)), self._told
-        held = False if last is None else (told == last).all(axis=0)  # nothing new to the drive
+        held = False if last is None or self.keeps_velocity else (
+            told == last).all(axis=0)                            # nothing new to the drive
         self._goes = np.where(held, 0.0, told[1])
         self._told_ns, self._told = time_ns, told
 

@@ -15,28 +15,33 @@ pytest.importorskip('rclpy')
 pytest.importorskip('mujoco')
 
 import ros_processes
-from low_level import LowLevel
 from rclpy.parameter import Parameter
 from ros_processes import Ros
 from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import SetBool
 
+from dmp_cpg_ros.commands.low_level_robot import LowLevelTopics
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.modes.motion_library import lying_posture
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS
 from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp
 from dmp_cpg_ros.nodes.ros2_control_driver import DriverParameters, Ros2ControlDriver
+from dmp_cpg_ros.robot.low_level import LowLevelRobot
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.suite_table import DRIVER
 
 ros, ros_domain = ros_processes.ros, ros_processes.ros_domain
+
+ORDER = (*reversed(JOINT_NAMES), 'gripper')
+"""Joints in the order of somebody else, with one that is not ours."""
 
 
 class Bench:
     """The driver and a robot for it; the test sends what the legs would."""
 
     def __init__(self, ros: Ros, interfaces: tuple[str, ...]) -> None:
-        self.ros, self.robot = ros, LowLevel(ros, interfaces)
+        self.ros, self.robot = ros, LowLevelRobot(interfaces=interfaces)
+        self.topics = LowLevelTopics(ros.node, self.robot, interfaces, ORDER, False)
         self.driver = Ros2ControlDriver(context=ros.context, parameter_overrides=[
             Parameter('command_interfaces', value=list(interfaces))])
         self.driver.start()
@@ -46,12 +51,12 @@ class Bench:
         self.legs = ros.node.create_publisher(JointState, 'joint_targets', 100)
         self.ticks: list[Any] = ros.collect(JointState, 'joint_states', 100)
         self.imus: list[Any] = ros.collect(Imu, 'imu', 100)
-        ros.spin_until(lambda: self.robot.matched and self.legs.get_subscription_count() > 0
+        ros.spin_until(lambda: self.topics.matched and self.legs.get_subscription_count() > 0
                        and ros.node.count_publishers('joint_states') > 0)
 
     def told(self) -> None:
         """Tell the driver what the robot measures now."""
-        self.robot.publish()
+        self.topics.publish()
         now = self.robot.state.time_ns
         self.ros.spin_until(lambda: self.driver._state.time_ns == now)
 
@@ -62,9 +67,9 @@ class Bench:
         """Let a commanded robot go on."""
         for _ in range(steps):
             self.robot.step()
-            before = self.robot.taken
+            before = self.topics.taken
             self.told()
-            self.ros.spin_until(lambda before=before: self.robot.taken > before)
+            self.ros.spin_until(lambda before=before: self.topics.taken > before)
 
     def send(self, leg: int, place: Any, torque: float = 0.0, **changes: Any) -> None:
         """Send targets of a leg at the newest tick."""
@@ -93,9 +98,9 @@ def test_nothing_is_commanded_before_it_is_enabled_and_enabling_needs_an_imu(ros
         made.told()
         made.robot.step()
         made.told()
-        assert made.robot.taken == 0
+        assert made.topics.taken == 0
         assert made.enable().success
-        ros.spin_until(lambda: made.robot.taken == 1)
+        ros.spin_until(lambda: made.topics.taken == 1)
         held = made.robot.command['position']
         assert np.allclose(held, made.robot.state.joint_position, atol=1e-3)
         assert 'belly' in made.enable().message
@@ -193,8 +198,8 @@ def test_ticks_are_whole_at_any_rate_and_a_silent_imu_tells_nothing(
     with bench(ros, 'position') as made:
         start = 1_700_000_000_001_300_000
         made.told()
-        imu = made.robot._imu
-        joints = made.robot._joints
+        imu = made.topics._imu
+        joints = made.topics._states
         told = Imu()
         told.orientation_covariance[0] = -1.0
         set_stamp(told.header.stamp, start)

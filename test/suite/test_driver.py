@@ -20,20 +20,24 @@ import ros_processes
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist
-from low_level import LowLevel
 from ros_processes import SHARED_HZ, Processes, Ros
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.commands.low_level_robot import LowLevelTopics
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.nodes.messages.interfaces import COMMAND_INTERFACES, interface
+from dmp_cpg_ros.robot.low_level import TIMEOUT_NS, LowLevelRobot
 from dmp_cpg_ros.suite_table import DRIVER, ROBOT, WALKING, WALKING_NODES
 
 processes, ros, ros_domain = (
     ros_processes.processes, ros_processes.ros, ros_processes.ros_domain)
 
 TICK_NS = round(1e9 / SHARED_HZ)
+
+ORDER = (*reversed(JOINT_NAMES), 'gripper')
+"""Joints in the order of somebody else, with one that is not ours."""
 
 
 class Session:
@@ -54,7 +58,8 @@ class Session:
             '--ros-args', '--params-file', str(file))
         self.driver = processes.node(DRIVER, command_interfaces=list(interfaces),
                                      control_rate=SHARED_HZ)
-        self.ros, self.robot = ros, LowLevel(ros, interfaces)
+        self.ros, self.robot = ros, LowLevelRobot(interfaces=interfaces)
+        self.topics = LowLevelTopics(ros.node, self.robot, interfaces, ORDER)
         self.answered = {leg: -1 for leg in LEGS}
         self.heard: dict[str, str] = {}
         self.stop: dict[str, str] = {}
@@ -68,7 +73,7 @@ class Session:
         self._command, self.speed = node.create_publisher(Twist, 'cmd_vel', 10), 0.0
         self.commanded = self.silent = False
         self._wanted_ns = -1
-        ros.spin_until(lambda: self.robot.matched
+        ros.spin_until(lambda: self.topics.matched
                        and node.count_publishers('joint_targets') == len(LEGS), 90.0)
         going_on = node.create_timer(0.5, self._go_on)           # until all have met
         ros.spin_until(lambda: min(self.answered.values()) >= 0, 90.0, what=lambda: str(self))
@@ -80,7 +85,7 @@ class Session:
     def _go_on(self) -> None:
         """Let the robot's time go on by a tick: nobody answers the same stamp again."""
         end = self.robot.state.time_ns + TICK_NS
-        self.robot.publish()
+        self.topics.publish()
         while self.robot.state.time_ns < end:
             self.robot.step()
 
@@ -101,17 +106,17 @@ class Session:
         robot, end = self.robot, self.robot.state.time_ns + round(seconds * 1e9)
         while robot.state.time_ns < end:
             robot.step()
-            now, taken = robot.state.time_ns, robot.taken
+            now, taken = robot.state.time_ns, self.topics.taken
             if now % 100_000_000 == 0:
                 command = Twist()
                 command.linear.x = self.speed
                 self._command.publish(command)
-            robot.publish()
+            self.topics.publish()
             if not self.silent:
                 tick = now - now % TICK_NS
                 self.ros.spin_until(lambda tick=tick: min(self.answered.values()) >= tick, 60.0)
             if self.commanded:
-                self.ros.spin_until(lambda taken=taken: robot.taken > taken, 60.0)
+                self.ros.spin_until(lambda taken=taken: self.topics.taken > taken, 60.0)
 
     def run_until(self, condition: Any, seconds: float) -> None:
         """Let the robot's time go on until something holds; fails after so long."""
@@ -145,7 +150,7 @@ def test_a_low_level_interface_walks_stops_and_is_left_alone_safely(
     session = Session(processes, ros, tmp_path, COMMAND_INTERFACES)
     robot = session.robot
     session.run(0.1)
-    assert robot.taken == 0                                      # the dead man's switch is off
+    assert session.topics.taken == 0 and robot.damped   # the dead man's switch is off
     answer = ros.call(SetBool, f'{DRIVER}/enable', SetBool.Request(data=True))
     assert answer.success, answer.message
     session.commanded = True
@@ -156,6 +161,7 @@ def test_a_low_level_interface_walks_stops_and_is_left_alone_safely(
     answer = ros.call(Trigger, 'stand_up', Trigger.Request())
     assert answer.success, answer.message
     session.run_until(lambda: session.heard.get('body_mode') == 'standing', 8.0)
+    height = robot.robot.height_over_ground
 
     session.speed = 0.4
     start = robot.state.base_position_in_world[0]
@@ -183,3 +189,10 @@ def test_a_low_level_interface_walks_stops_and_is_left_alone_safely(
     session.silent = True
     session.run_until(lambda: session.heard['drive_mode'] == 'stand', 1.0)
     session.comes_to_rest(3.0)
+    session.driver.kill()
+    session.commanded = False
+    assert not robot.damped
+    session.run(TIMEOUT_NS * 1e-9 + 0.01)
+    assert robot.damped and robot.timeouts == 1                  # nobody repeats the last command
+    session.run_until(lambda: robot.robot.height_over_ground < 0.5 * height, 3.0)
+    assert session.topics.refused == 0

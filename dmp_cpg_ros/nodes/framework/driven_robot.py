@@ -60,11 +60,17 @@ class DrivenRobot(SuiteNode):
                                       self.parameters_of(TickParameters).tick_ns
                                       if self.lossy else 0, self.return_ns)
         self._guard.drives.watches = self.has_drives
+        self._guard.drives.keeps_velocity = self.keeps_velocity
 
     @property
     def has_drives(self) -> bool:
         """Whether something moves the joints whose torques tell how it does."""
         return True
+
+    @property
+    def keeps_velocity(self) -> bool:
+        """Whether the drives are told velocities at a rate of their own."""
+        return False
 
     def watchdog_values(self) -> dict[str, Any]:
         """What ``/diagnostics`` tells of the watchdog."""

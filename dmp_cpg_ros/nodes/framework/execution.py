@@ -299,7 +299,7 @@ def run_nodes(program: str, arguments: Sequence[str],
         As for :func:`run_node`.
     """
     nodes: list[SuiteNode] = []
-    until = _first_signal()
+    until = first_signal()
     status = _status(program, lambda: _run(program, arguments, make, nodes, until))
     for node in nodes:
         status = max(status, _status(program, node.close))
@@ -352,7 +352,7 @@ def _status(program: str, body: Callable[[], object]) -> int:
     return status
 
 
-def _first_signal() -> Future:
+def first_signal() -> Future:
     """Return a future that SIGINT, SIGTERM or SIGHUP, of a terminal that is closed, completes;
     nothing else comes of them.
 
