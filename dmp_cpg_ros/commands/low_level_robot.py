@@ -12,7 +12,9 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from array import array
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -30,7 +32,7 @@ from dmp_cpg_ros.commands.ros_arguments import positive, within
 from dmp_cpg_ros.commands.suite_client import prepared
 from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
-from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
 from dmp_cpg_ros.nodes.framework.claims import claim
 from dmp_cpg_ros.nodes.framework.execution import (
     BAD_INPUT,
@@ -47,8 +49,9 @@ from dmp_cpg_ros.nodes.messages.interfaces import (
     JOINT_BROADCASTER,
     commands_of,
     foot_wrench,
+    interface,
 )
-from dmp_cpg_ros.nodes.messages.values import set_stamp
+from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp
 from dmp_cpg_ros.robot.low_level import PERIOD_NS, TIMEOUT_NS, LowLevelRobot
 from dmp_cpg_ros.robot.port import RobotError
 
@@ -58,6 +61,9 @@ PERIOD_S = PERIOD_NS * 1e-9
 
 TIMEOUTS_S, LAGS_S = (0.004, 10.0), (0.0, 10.0)
 """Least and largest times that may be asked for [s]."""
+
+BEHIND_NS = 20_000_000
+"""Age of targets for which a robot waits that waits [ns]: five ticks of 250 Hz."""
 
 AT_ONCE = 5
 """Periods that are made up for at once when this process was late; time beyond them is lost."""
@@ -88,6 +94,8 @@ class LowLevelTopics:
         Commands that were none.
     on_command : callable ()
         Is called after each whole command.
+    targets_ns : list of int
+        Stamps of the legs' newest targets, where they are heeded; −1 before the first [ns].
     """
 
     def __init__(self, node: Node, robot: LowLevelRobot,
@@ -97,6 +105,7 @@ class LowLevelTopics:
         self.robot, self.taken, self.refused = robot, 0, 0
         self._felt = 1.0 if reports_effort else np.nan
         self.on_command: Callable[[], None] = lambda: None
+        self.targets_ns = [-1] * len(LEGS)
         self._node, self._last = node, interfaces[-1]
         self._names = list(robot.joint_names if order is None else order)
         known = [name for name in self._names if name in robot.joint_names]
@@ -113,6 +122,16 @@ class LowLevelTopics:
         """Whether somebody reads what it measures."""
         return all(publisher.get_subscription_count()
                    for publisher in (self._imu, self._states, *self._feet))
+
+    def heed_targets(self) -> None:
+        """Note how far the suite has come; no robot hears of that."""
+        topic = interface('joint_targets')
+        self._node.create_subscription(topic.type, topic.name, self._note, topic.reader_qos)
+
+    def _note(self, message: JointState) -> None:
+        with suppress(DataError, IndexError, ValueError):        # what the driver refuses, too
+            joint = self.robot.joint_names.index(message.name[0])
+            self.targets_ns[joint // len(JOINTS_OF_LEG)] = header_ns(message)
 
     def _taker(self, name: str) -> Callable[[Any], None]:
         def take(message: Float64MultiArray) -> None:
@@ -147,21 +166,23 @@ class LowLevelTopics:
         told[:, self._places] = np.array(
             (state.joint_position, state.joint_velocity, self._felt * state.joint_effort)
         )[:, self._joints]
-        position, velocity, effort = told.tolist()
+        position, velocity, effort = (array('d', row.tobytes()) for row in told)
         joints = JointState(name=self._names, position=position, velocity=velocity, effort=effort)
         joints.header.stamp = imu.header.stamp
         self._states.publish(joints)
 
 
 class Pace:
-    """Lets the robot's time go on with the machine's, and measures how well, while it is commanded.
+    """Lets the robot's time go on with the machine's, and measures how well from the first
+    command on.
 
     Parameters
     ----------
     topics : LowLevelTopics
         The robot.
     longest_lag_s : float
-        How long a period waits for the commands of the one before, once they come [s].
+        How long a period waits for the commands of the one before, once they come, and for
+        targets that are not older than ``BEHIND_NS`` [s].
     """
 
     def __init__(self, topics: LowLevelTopics, longest_lag_s: float = 0.0) -> None:
@@ -173,6 +194,7 @@ class Pace:
         self.states, self.gaps, self.answers = Durations(), Durations(), Durations()
         self.longest_state_s = self.longest_gap_s = self.lost_s = 0.0
         self.periods = self.commands = self.unanswered = 0
+        self._from = topics.robot.state.base_position_in_world
         topics.on_command = self._note_command
 
     def go_on(self) -> None:
@@ -194,7 +216,9 @@ class Pace:
         """Whether the robot's time waits for an answer; who has not answered for so long is not
         waited for until the next one.
         """
-        if self._topics.taken > self._answered:
+        oldest_ns = min(self._topics.targets_ns)
+        if self._topics.taken > self._answered and (
+                oldest_ns < 0 or self._topics.robot.state.time_ns - oldest_ns <= BEHIND_NS):
             self._waited = False
         elif not self._waited and self._begun >= 0.0:
             self._waited = now >= self._published + self._lag_s
@@ -228,6 +252,7 @@ class Pace:
     def results(self) -> dict[str, Any]:
         """What was measured since the first command, for JSON; empty without any."""
         seconds = self._published - self._begun
+        place = self._topics.robot.state.base_position_in_world
         if self._begun < 0.0 or not self.commands or seconds <= 0.0:
             return {}
         return {
@@ -240,7 +265,8 @@ class Pace:
             'command_gap_ms_max': 1e3 * self.longest_gap_s,
             'answer_ms_p50': 1e3 * self.answers.percentile(50.0),
             'unanswered_share': self.unanswered / max(1, self.periods),
-            'timeouts': self._topics.robot.timeouts, 'refused': self._topics.refused}
+            'timeouts': self._topics.robot.timeouts, 'refused': self._topics.refused,
+            'moved_m': float(np.hypot(*(place - self._from)[:2]))}
 
 
 def told(results: dict[str, Any]) -> str:
@@ -257,7 +283,7 @@ def told(results: dict[str, Any]) -> str:
         f'a command comes {of["answer_ms_p50"]} ms after the newest state (median); none came '
         f'within the period in {100.0 * results["unanswered_share"]:.2f} %\n'
         f'damped {results["timeouts"]} times for want of commands, {results["refused"]} commands '
-        'refused')
+        f'refused; it is {of["moved_m"]} m from where it began')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -284,6 +310,8 @@ def _run(options: argparse.Namespace, words: Sequence[str]) -> int:
     claimed = claim(node.get_fully_qualified_name(), node.context.get_domain_id())
     until = first_signal()
     topics = LowLevelTopics(node, low_level, topics_of, reports_effort=not options.no_effort)
+    if options.longest_lag:
+        topics.heed_targets()
     pace, failed = Pace(topics, options.longest_lag), list[DmpCpgError]()
 
     def go_on() -> None:
@@ -325,8 +353,8 @@ def _parser() -> argparse.ArgumentParser:
         help='silence of a controller after which all motors are damped [s], {:g} to {:g} '
         '(default: %(default)g)'.format(*TIMEOUTS_S))
     add('--longest-lag', metavar='S', type=within(*LAGS_S), default=0.0,
-        help="how long the robot's time waits for the answer to a state [s], for a machine that "
-        'is too slow; the time of a real robot does not (default: 0)')
+        help="how long the robot's time waits for the answer to a state, and for a suite that is "
+        'behind [s], for a machine that is too slow; that of a real robot does not (default: 0)')
     add('--seconds', metavar='S', type=positive, default=inf,
         help="end when the robot's time is this [s] (default: at Ctrl-C)")
     add('--namespace', metavar='NAME', help="the suite's namespace")

@@ -59,6 +59,10 @@ class ProcessGroup:
         """Start a process that has ended once more."""
         self.start(name, self._commands[name])
 
+    def pid(self, name: str) -> int:
+        """Number of a process."""
+        return self._processes[name].pid
+
     def kill(self, name: str) -> None:
         """End a process that does not answer."""
         self._processes[name].kill()

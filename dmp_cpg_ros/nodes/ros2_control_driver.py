@@ -8,6 +8,7 @@ become commands of forward_command_controllers. Nothing is commanded before ``~/
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -214,7 +215,8 @@ class Ros2ControlDriver(DrivenRobot):
                 *(values[name] for name in ('position', 'velocity', 'effort'))))
             values['effort'] = self._drive.torque(0, state.joint_position, state.joint_velocity)
         for name, publisher in self._joint_publishers.items():
-            publisher.publish(Float64MultiArray(data=values[name].tolist()))
+            # An array of its type is taken as it is; of a list, every entry is looked at.
+            publisher.publish(Float64MultiArray(data=array('d', values[name].tobytes())))
 
     def _take_request(self, request: Any) -> tuple[bool, str]:
         """Enable, or stop following the legs."""

@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.state import JointTargets
-from dmp_cpg_ros.robot.model_reader import load_description
+from dmp_cpg_ros.robot.model_loader import load_model
+from dmp_cpg_ros.robot.model_reader import read_description
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file
 
@@ -100,7 +101,7 @@ class LowLevelRobot:
         file = load_robot_file(robot_file)
         self.joint_names = file.joint_names
         self.robot = MujocoRobot(file.without_gains(), MOTOR_NS, start_pose=start_pose)
-        gains = load_description(file)
+        gains = read_description(load_model(file.model, file.base), file)
         own = {'kp': np.tile(gains.kp, 4), 'kd': np.tile(gains.kd, 4)}
         nothing = np.zeros(12)
         self._damping = own['kd']
