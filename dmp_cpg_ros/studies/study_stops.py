@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import groupby, product
-from math import pi
+from math import isnan, pi
 from pathlib import Path
 from typing import Any
 
@@ -37,16 +37,28 @@ from dmp_cpg_ros.studies.stop_trials import METHODS, Results, StopCase, run_case
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_gait
 
-COLUMNS = ('gait', 'm/s', 'leg', 'cadence', 'braking', 'stopped by', 'cases', 'fell', 'stood',
-           'walked on', 'prediction error %', 'over bound', 'bound s', 'rest s', 'body rest s',
-           'still s', 'slip mm',
-           'moved m', 'tilt deg', 'm/s^2')
+SPREADS = {
+    'prediction error %': ('prediction_error', 100.0, 1), 'bound s': ('bound_s', 1.0, 2),
+    'rest s': ('measured_s', 1.0, 2), 'body rest s': ('body_rest_s', 1.0, 2),
+    'still s': ('still_s', 1.0, 2), 'slip mm': ('slip_m', 1e3, 1),
+    'moved m': ('displacement_m', 1.0, 2), 'tilt deg': ('tilt', 180.0 / pi, 1),
+    'm/s^2': ('deceleration', 1.0, 1)}
+"""Columns with two numbers: what of an outcome, in which unit, with how many digits."""
 
+KEY, COUNTED = (('gait', 'speed', 'leg', 'cadence', 'braking', 'method'),
+                ('fell', 'standing', 'walked_on', 'bounded', 'bound_exceeded'))
+"""What the stops of a row have in common, as :attr:`.StopCase.row`; what is counted of them."""
+
+FIRST = 'prediction error %'
+"""Column that comes before the one of bounds."""
+
+COLUMNS = ('gait', 'm/s', 'leg', 'cadence', 'braking', 'stopped by', 'cases', 'fell', 'stood',
+           'walked on', FIRST, 'over bound', *(name for name in SPREADS if name != FIRST))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study and print its table; returns the exit status."""
-    parser = parser_of('study_stops', __doc__, 'every case and outcome, of --random what they say')
+    parser = parser_of('study_stops', __doc__, 'the numbers that are printed')
     parser.add_argument('file', nargs='?', help="parameter file; the package's own without")
     parser.add_argument('--phases', type=int, default=16, metavar='N',
                         help='request phases, evenly over a cycle (default: 16)')
@@ -72,7 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                         'push up to 2.6 N s, ground; says how often the body stands as was said')
     parser.add_argument('--seed', type=int, default=0, help='of --random (default: 0)')
     parser.add_argument('--record', type=Path, metavar='FILE',
-                        help='of --random: add outcomes here, and go on from those that are there')
+                        help='add every case and its outcome here, a line of JSON each, and go on '
+                        'from those that are there')
     parser.add_argument('--quiet', action='store_true', help='show no progress')
     return run_command(parser, arguments, _study)
 
@@ -85,8 +98,8 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
     results = run_cases(cases, options.file, Workers(
         options.workers, options.cluster, not options.quiet), options.record)
     print(f'{suite.file}: {len(cases)} stops; columns with two numbers are median / worst\n')
-    print(table(results, by_case=not options.random))
-    told: Any = [vars(case) | vars(outcome) for case, outcome in results]
+    told: Any = summarised(results, by_case=not options.random)
+    print(table(told))
     if options.random:
         told = summary(cases, [outcome for _, outcome in results], options.seed)
         print(f'\n{scenario_bound(told)}')
@@ -116,33 +129,45 @@ def cases_of(options: argparse.Namespace) -> list[StopCase]:
                 methods, phases)]
 
 
-def table(results: Results, by_case: bool = True) -> str:
-    """Markdown table: a row per gait, speed, cadence, leg and method unless there is to be none,
-    and one for each method.
+def summarised(results: Results, by_case: bool = True) -> list[dict[str, Any]]:
+    """Rows of the table as numbers: one per gait, speed, leg, cadence, braking and method unless
+    there is to be none, and one for each method.
+
+    Returns
+    -------
+    list of dict
+        What the stops of a row have in common (of ``all`` the method only), how many there are,
+        in how many something is so, and of numbers the median and the worst.
     """
-    rows = [([f'{part:g}' if isinstance(part, float) else part for part in key], list(group))
+    rows = [(dict(zip(KEY, key, strict=True)), list(group))
             for key, group in groupby(results, lambda result: result[0].row) if by_case]
-    rows += [(['all', '', '', '', '', method], [result for result in results
-                                            if result[0].method == method]) for method in METHODS]
-    return markdown_table(COLUMNS, [
-        (*labels, *_cells([outcome for _, outcome in group], labels[-1]))
-        for labels, group in rows if group])
+    rows += [({**dict.fromkeys(KEY), 'gait': 'all', 'method': method},
+              [result for result in results if result[0].method == method]) for method in METHODS]
+    return [{**key, **_numbers([outcome for _, outcome in group])} for key, group in rows if group]
 
 
-def _cells(outcomes: Sequence[StopOutcome], method: str) -> tuple[str, ...]:
+def _numbers(outcomes: Sequence[StopOutcome]) -> dict[str, Any]:
     of = runs.StopSummary(outcomes)
-    fell, stood, walked_on, bounded, exceeded = map(of.number, (
-        'fell', 'standing', 'walked_on', 'bounded', 'bound_exceeded'))
+    return {'cases': len(outcomes), **{name: of.number(name) for name in COUNTED},
+            **{name: of.spread(name) for name, _, _ in SPREADS.values()}}
+
+
+def table(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Markdown table of rows as :func:`summarised` makes them, or as their file has them."""
+    return markdown_table(COLUMNS, [
+        (*('' if row[name] is None else f'{row[name]:g}' if isinstance(row[name], float) else
+           row[name] for name in KEY), *_cells(row)) for row in rows])
+
+
+def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
+    count, bounded = row['cases'], row['bounded']
     prediction_error, *others = (
-        of.cell(name, scale, digits) for name, scale, digits in (
-            ('prediction_error', 100.0, 1), ('bound_s', 1.0, 2), ('measured_s', 1.0, 2),
-            ('body_rest_s', 1.0, 2), ('still_s', 1.0, 2), ('slip_m', 1e3, 1),
-            ('displacement_m', 1.0, 2),
-            ('tilt', 180.0 / pi, 1), ('deceleration', 1.0, 1)))
-    count = len(outcomes)
-    return (str(count), str(fell), percent(stood, count),
-            percent(walked_on, count) if method == METHODS[0] else '-', prediction_error,
-            f'{exceeded}/{bounded}' if bounded else '-', *others)
+        '-' if row[name][0] is None or isnan(row[name][0]) else ' / '.join(
+            f'{scale * one:.{digits}f}' for one in row[name])
+        for name, scale, digits in SPREADS.values())
+    return (str(count), str(row['fell']), percent(row['standing'], count),
+            percent(row['walked_on'], count) if row['method'] == METHODS[0] else '-',
+            prediction_error, f'{row["bound_exceeded"]}/{bounded}' if bounded else '-', *others)
 
 
 if __name__ == '__main__':

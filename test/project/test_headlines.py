@@ -14,6 +14,7 @@ from checkout import ROOT, modules, setup_constant
 from headlines import (
     BENCHMARK,
     README,
+    STOPS,
     STUDIES,
     content,
     headlines,
@@ -21,6 +22,7 @@ from headlines import (
     section,
     table_of_studies,
     tables,
+    with_tables,
 )
 from headlines_of_commands import DEFAULTS, OPTIONS, options_of
 
@@ -49,6 +51,13 @@ def told(text: str) -> set[str]:
 def test_headlines_are_what_their_files_say() -> None:
     found = headlines()
     assert found == {anchor: ROWS[anchor][1] for anchor in found}
+
+
+def test_the_tables_of_stops_are_what_their_files_say() -> None:
+    text = STOPS.read_text(encoding='utf-8')
+    assert with_tables(text) == text
+    wrong = re.sub(r' 0 \| 100 % ', ' 1 | 100 % ', text, count=1)
+    assert wrong != text and with_tables(wrong) == text
 
 
 @pytest.mark.parametrize('study', STUDIES)

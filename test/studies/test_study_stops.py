@@ -171,20 +171,54 @@ def test_a_stop_that_never_came_to_rest_exceeds_its_bound() -> None:
     assert not StopOutcome(False, measured_s=1.0).bound_exceeded
 
 
-def test_the_command_prints_a_row_per_method_and_writes_every_case(
+def test_the_command_prints_a_row_per_method_and_writes_its_numbers_and_every_case(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from dmp_cpg_ros.studies.study_stops import main
+    from dmp_cpg_ros.studies.study_stops import main, table
 
-    written = []
+    written, printed = [], []
     for jobs in ('1', '2'):
-        file = tmp_path / f'{jobs}.json'
+        file, record = tmp_path / f'{jobs}.json', tmp_path / f'{jobs}.jsonl'
         assert main(['--phases', '1', '--speeds', '0.3', '--gaits', 'trot', '--jobs', jobs,
-                     '--quiet', '--json', str(file)]) == 0
+                     '--quiet', '--json', str(file), '--record', str(record)]) == 0
+        (line,) = record.read_text(encoding='utf-8').splitlines()
+        of = json.loads(line)
+        assert of['case']['gait'] == 'trot' and of['outcome']['standing']
         written.append(json.loads(file.read_text(encoding='utf-8')))
+        printed.append(capsys.readouterr().out)
     assert written[0] == written[1]
-    assert len(written[0]) == 1 and all(case['standing'] for case in written[0])
-    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith('| trot')]
-    assert len(rows) == 2 and all('inhibition' in row for row in rows)
+    assert [row['gait'] for row in written[0]] == ['trot', 'all']
+    assert all(row['cases'] == row['standing'] == 1 for row in written[0])
+    for out in printed:
+        assert table(written[0]) in out
+        rows = [line for line in out.splitlines() if line.startswith('| trot')]
+        assert len(rows) == 1 and 'inhibition' in rows[0]
+
+
+def test_the_numbers_of_a_row_are_those_of_its_stops_through_their_file() -> None:
+    from dmp_cpg_ros.analysis.strict_json import to_json
+    from dmp_cpg_ros.studies.study_stops import summarised, table
+
+    case = StopCase('trot', 0.5, 0.0)
+    frozen = replace(case, method='freeze')
+    rests = [StopOutcome(False, True, True, predicted_s=1.0, bound_s=2.0, measured_s=measured,
+                         body_rest_s=rest, slip_m=0.002)
+             for measured, rest in ((1.0, 0.5), (1.25, 0.7), (2.5, 0.9))]
+    rows = summarised([*((case, one) for one in rests), (frozen, StopOutcome(fell=True))])
+    assert [(row['gait'], row['method'], row['cases'], row['fell']) for row in rows] == [
+        ('trot', 'inhibition', 3, 0), ('trot', 'freeze', 1, 1),
+        ('all', 'inhibition', 3, 0), ('all', 'freeze', 1, 1)]
+    first, second = rows[:2]
+    assert first['bound_exceeded'] == 1 and first['measured_s'] == (1.25, 2.5)
+    assert first['prediction_error'] == pytest.approx((0.2, 0.6))
+    again = json.loads(to_json(rows))
+    assert table(again) == table(rows)
+    cells = [cell.strip() for cell in table(again).splitlines()[2].strip('|').split('|')]
+    assert cells[:12] == ['trot', '0.5', 'fl', '1', '0', 'inhibition', '3', '0', '100 %', '100 %',
+                          '20.0 / 60.0', '1/3']
+    assert '0.70 / 0.90' in cells and '2.0 / 2.0' in cells
+    assert again[1]['slip_m'] == [None, None] and np.isnan(second['slip_m']).all()
+    assert [cell.strip() for cell in table(again).splitlines()[3].strip('|').split('|')][
+        9:12] == ['-', '-', '-']
 
 
 @pytest.mark.parametrize('arguments', [['--gaits', 'gallop'], ['--phases', '0'], ['none.yaml']])

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the documents say of studies, made from the files that their commands write.
 
-``python headlines.py`` (``make headlines``) writes the headlines of the README anew, and prints
-what ``doc/results.md`` and others should say and do not.
+``python headlines.py`` (``make headlines``) writes the headlines of the README and the tables of
+``doc/stops.md`` anew, and prints what ``doc/results.md`` and others should say and do not.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ import headlines_of_faults as faults
 from checkout import ROOT
 
 from dmp_cpg_ros.studies.random_stops import ROUGHNESS
+from dmp_cpg_ros.studies.study_stops import table
 from dmp_cpg_ros.studies.walking_trials import relative_error
 
 README = ROOT / 'README.md'
 
 STOPS = ROOT / 'doc' / 'stops.md'
-"""The tables that ``study_stops`` prints, of :func:`stops` and of :func:`brisk_stops`."""
+"""Has the tables that ``study_stops`` prints, between lines that name their files."""
 
 BENCHMARK = ROOT / 'doc' / 'performance.md'
 """The table that ``bench_ros`` writes, of :func:`rate`."""
@@ -89,7 +90,7 @@ def as_predicted(episodes: Any) -> str:
 
 
 def stops(rows: Sequence[dict[str, str]]) -> str:
-    """Of the table of ``doc/stops.md``."""
+    """Of the rows of ``study_stops`` with ``--baselines``."""
     of = {way: [row for row in rows if row['gait'] != 'all' and row['stopped by'] == way]
           for way in ('inhibition', 'freeze')}
     count, fell = (sum(int(row[name]) for row in of['inhibition']) for name in ('cases', 'fell'))
@@ -103,7 +104,7 @@ def stops(rows: Sequence[dict[str, str]]) -> str:
 
 
 def brisk_stops(rows: Sequence[dict[str, str]]) -> str:
-    """Of the table of brisk stops in ``doc/stops.md``."""
+    """Of the rows of ``study_stops`` with ``--braking``."""
     *cases, whole = rows
     over, bounded = whole['over bound'].split('/')
     assert bounded == whole['cases'] and whole['prediction error %'] == '0.0 / 0.0', whole
@@ -471,24 +472,35 @@ STUDIES = {
     'hostile-neighbours': Study(faults.hostile, faults.hostile_rows, 'doc/faults.md'),
     'killed-nodes': Study(None, faults.kill_rows, 'doc/faults.md')}
 """Studies that have a file, ``doc/results/ANCHOR.json``, by the anchor of their section; that of
-the experiment is a run's ``metrics.json``, of rates there are several in a folder, and that of
-stops is :data:`STOPS`.
+the experiment is a run's ``metrics.json``, and of rates there are several in a folder.
 """
 
 
 TABLES_OF_STOPS = ('stops-at-every-phase', 'brisk-stops')
+"""Studies whose file has the numbers of a table of :data:`STOPS`; their content is its rows."""
 
 
 def content(anchor: str) -> Any:
     """What the command of a study has written."""
-    if anchor in TABLES_OF_STOPS:
-        return dict(zip(TABLES_OF_STOPS, tables(STOPS.read_text(encoding='utf-8')), strict=True))[
-            anchor]
     name = STUDIES[anchor].file or anchor
     if (bodies.FOLDER / name).is_dir():
         return {file.stem: json.loads(file.read_text(encoding='utf-8'))
                 for file in (bodies.FOLDER / name).glob('*.json')}
-    return json.loads((bodies.FOLDER / f'{name}.json').read_text(encoding='utf-8'))
+    written = json.loads((bodies.FOLDER / f'{name}.json').read_text(encoding='utf-8'))
+    return next(tables(table(written))) if anchor in TABLES_OF_STOPS else written
+
+
+def with_tables(text: str) -> str:
+    """The text of :data:`STOPS` with the tables that its files say."""
+    for anchor in TABLES_OF_STOPS:
+        rows = content(anchor)
+        told = (rows[0], ['---'] * len(rows[0]), *(row.values() for row in rows))
+        lines = '\n'.join(f'| {" | ".join(cells)} |' for cells in told)
+        text, count = re.subn(
+            rf'(<!-- {anchor}: begin -->\n).*?(\n<!-- {anchor}: end -->)',
+            rf'\1\n{lines}\n\2', text, flags=re.DOTALL)
+        assert count == 1, f'{STOPS} has no place for {anchor}'
+    return text
 
 
 def headlines() -> dict[str, str]:
@@ -516,6 +528,7 @@ def main() -> int:
                             f'| {title} | {headline} | {command} |')
         print(f'{anchor}: {headline}')
     README.write_text(text, encoding='utf-8')
+    STOPS.write_text(with_tables(STOPS.read_text(encoding='utf-8')), encoding='utf-8')
     for anchor in STUDIES:
         for row in missing(anchor):
             print(f'{STUDIES[anchor].document}#{anchor} has not: {row}')
