@@ -5,8 +5,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import ctypes
 import logging
 import os
 import sys
@@ -36,6 +34,7 @@ from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT, RosArguments, one_line
 from dmp_cpg_ros.commands.run_folder import picture_taker, run_context, run_of
 from dmp_cpg_ros.configuration import naming, writable
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+from dmp_cpg_ros.process import give_back_memory
 
 PARTLY = 1
 """Exit status where some of several runs could not be used."""
@@ -110,9 +109,9 @@ def analyze_run(
                          certificate, draw, report, tell)
 
 
-M_MMAP_THRESHOLD, LARGE = -3, 4 << 20
-"""Of mallopt(3), and arrays [bytes] whose memory goes back to the system when they do; otherwise
-what an hour's take in turn adds up.
+LARGE_ARRAY = 4 << 20
+"""Memory that goes back to the system with an array; that of an hour's arrays, which come one
+after the other, otherwise adds up [bytes].
 """
 
 SHOWN = {'joint_targets': ('position',), 'canonical_state': ('position',)}
@@ -160,9 +159,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _analyze(options: argparse.Namespace, _: RosArguments) -> int:
-    # another C library than glibc, or, on Windows, none by this name
-    with contextlib.suppress(AttributeError, OSError, TypeError):
-        ctypes.CDLL(None).mallopt(M_MMAP_THRESHOLD, LARGE)
+    give_back_memory(LARGE_ARRAY)
 
     def export(recording: Recording) -> None:
         tables = recording.tables() | other_tables(find_bag(options.bags[0]), recording)

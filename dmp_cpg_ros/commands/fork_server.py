@@ -8,9 +8,9 @@ linked with, LTTng, has threads from the first import on, and is told of every f
 
 A ``walk`` that was forked, as tests do, has imported all of it, and forks its own server.
 
-Run as a program, ``PARENT SOCKET PADDING``, it is that process. What it forks becomes a child of
-its parent (``PR_SET_CHILD_SUBREAPER`` of prctl(2)), which waits for it as for any other, and ends
-with that parent, in whatever way it ends. Linux only.
+Run as a program, ``PARENT SOCKET PADDING``, it is that process, and finds the package only once it
+runs. What it forks becomes a child of its parent, which adopts it and waits for it as for any
+other, and ends with that parent, in whatever way it ends. Linux only.
 """
 
 from __future__ import annotations
@@ -32,11 +32,6 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import TracebackType
-
-PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_CHILD_SUBREAPER = 1, 15, 36
-"""Of prctl(2): which signal a process gets when the thread that is its parent ends, its name, and
-whether it adopts the processes that descendants leave behind.
-"""
 
 MOST_BYTES = 200_000
 """Longest request [bytes]: Linux takes a little more in one message."""
@@ -116,7 +111,9 @@ class ForkServer:
 
     def __init__(self, folder: str | None = None) -> None:
         """Start the server, in a working folder, or take the one at hand."""
-        _prctl(PR_SET_CHILD_SUBREAPER, 1)
+        from dmp_cpg_ros.process import adopt_orphans
+
+        adopt_orphans()
         self._server: subprocess.Popen[bytes] | Forked
         if _at_hand and folder is None:
             self._server, self._socket = _at_hand.pop()
@@ -176,15 +173,6 @@ class ForkServer:
     def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
                  traceback: TracebackType | None) -> None:
         self.close()
-
-
-def end_with_parent(number: int) -> None:
-    """Get a signal when the thread that is the parent of this process ends."""
-    _prctl(PR_SET_PDEATHSIG, number)
-
-
-def _prctl(option: int, value: int | bytes) -> None:
-    ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
 def _serve(parent: int, requests: socket.socket) -> None:
@@ -298,6 +286,8 @@ def _tell_tracer() -> None:
 def _become(parent: int, files: Sequence[int], command: Sequence[str],
             environment: Mapping[str, str]) -> None:
     """Be the process that was asked for: its session, files, environment, arguments, name."""
+    from dmp_cpg_ros.process import end_with_parent, show_name
+
     os.setsid()
     for number, descriptor in enumerate(files, 1):
         os.dup2(descriptor, number)
@@ -308,7 +298,7 @@ def _become(parent: int, files: Sequence[int], command: Sequence[str],
     os.environ.clear()
     os.environ.update(environment)
     _show([sys.executable, __file__, str(parent), *command])
-    _prctl(PR_SET_NAME, command[0].encode()[:15])
+    show_name(command[0])
     sys.argv = list(command)
 
 

@@ -7,12 +7,12 @@ In real time it keeps the wall clock's pace; in lock-step it waits for every tar
 
 from __future__ import annotations
 
-import ctypes
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,7 @@ from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS, Interface
 from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
 from dmp_cpg_ros.nodes.messages.robot_state import RobotStateWriter
 from dmp_cpg_ros.nodes.messages.values import set_stamp, stamp_ns
+from dmp_cpg_ros.process import end_with_parent
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.port import Robot, RobotError
@@ -57,9 +58,6 @@ MAKE_UP_NS = 100_000_000
 
 CLOCK_EVERY = 4
 """In real time ``/clock`` ticks with every so many states: the suite itself goes by stamps."""
-
-PR_SET_PDEATHSIG = 1
-"""Of prctl(2): which signal a process gets when its parent ends. Linux only."""
 
 VIEW_WAITS_S = 86400.0
 """How long a live view that the robot serves waits for the other nodes [s]."""
@@ -150,7 +148,7 @@ class MujocoRobotNode(DrivenRobot):
         return subprocess.Popen(
             [sys.executable, '-m', 'dmp_cpg_ros', 'live_view', '--wait', f'{VIEW_WAITS_S}',
              '--namespace', self.get_namespace()],
-            preexec_fn=lambda: ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM))
+            preexec_fn=partial(end_with_parent, signal.SIGTERM))
 
     def readers(self, topic: Interface) -> tuple[str, ...]:
         """Count those among the readers of a topic that read it with these parameters."""

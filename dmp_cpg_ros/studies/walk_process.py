@@ -18,9 +18,9 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from dmp_cpg_ros.commands.fork_server import end_with_parent
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.inhibition.supervisor import STATES
+from dmp_cpg_ros.process import end_with_parent
 from dmp_cpg_ros.studies.process_usage import pid_of
 
 WITHIN_S = 120.0

@@ -26,6 +26,8 @@ HOMES = {
     'SUITE_TABLE': 'suite_table',
     'POSTURE_ROWS': 'layouts',
     'parse_yaml': 'configuration',
+    'end_with_parent': 'process',
+    'give_back_memory': 'process',
 }
 """Ideas by the name that defines them."""
 

@@ -11,7 +11,6 @@ sleeps. The policy needs no privilege and changes nobody's share of the processo
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import faulthandler
 import gc
 import os
@@ -40,6 +39,7 @@ from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, MissingFileError, ParameterError
 from dmp_cpg_ros.nodes.framework.claims import claim
 from dmp_cpg_ros.nodes.framework.parameters import BATCH, NodeParameters, help_text
+from dmp_cpg_ros.process import give_back_memory
 from dmp_cpg_ros.suite_table import KINDS
 
 if TYPE_CHECKING:
@@ -84,19 +84,8 @@ def prepare_middleware() -> None:
         os.environ.update(dict.fromkeys(VARIABLES, subnet))
 
 
-M_MMAP_THRESHOLD, MAPPED_BYTES = -3, 2**20
-"""Option of mallopt(3), and the size from which memory is mapped, and given back when it is freed.
-"""
-
-
-def give_back_memory() -> None:
-    """Give large blocks back to the system when they are freed: glibc otherwise learns to keep as
-    much as the largest message of a stranger, and some more, in every node for ever.
-    """
-    mallopt = getattr(ctypes.CDLL(None), 'mallopt', None)  # of glibc
-    if mallopt is not None:
-        mallopt(M_MMAP_THRESHOLD, MAPPED_BYTES)
-
+LARGE_MESSAGE = 2**20
+"""Memory that no node keeps when it has read the message of a stranger [bytes]."""
 
 MOST_DOMAIN = 232
 """The highest ROS domain: beyond it the middleware has no ports, and ends the process."""
@@ -121,7 +110,7 @@ def start_ros(arguments: Sequence[str], context: Context | None = None) -> None:
     ParameterError
         If ROS refuses its environment, such as ``ROS_DOMAIN_ID``.
     """
-    give_back_memory()
+    give_back_memory(LARGE_MESSAGE)
     with _cannot_start():
         rclpy.init(args=[*arguments], context=context,
                    signal_handler_options=SignalHandlerOptions.NO)
