@@ -11,7 +11,6 @@ correct what the model does not know (:mod:`~dmp_cpg_ros.core.balance.correction
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from math import pi
 from typing import NamedTuple
 
@@ -19,8 +18,9 @@ import numpy as np
 
 from dmp_cpg_ros.core.balance import virtual_model
 from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
-from dmp_cpg_ros.core.balance.capture_point import WIDE, support_margins
+from dmp_cpg_ros.core.balance.capture_point import support_margins
 from dmp_cpg_ros.core.balance.corrections import MassOffset, VelocityCorrection
+from dmp_cpg_ros.core.balance.feedback import FELT, PostureFeedback
 from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, lean
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
@@ -48,7 +48,7 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 from dmp_cpg_ros.core.transformation.foot_path import activities_step, resting
-from dmp_cpg_ros.core.transformation.leg import LegFeedback, body_scale, nominal_foothold
+from dmp_cpg_ros.core.transformation.leg import body_scale, nominal_foothold
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
 
@@ -59,58 +59,6 @@ LARGEST_LOAD = 2.0
 
 LEVEL_WITH_GROUND: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 """Rotation from the base to the frame of the ground as planned."""
-
-FELT = (True,) * len(LEGS)
-
-
-@dataclass(frozen=True)
-class PostureFeedback:
-    """What the posture controller sends to the legs.
-
-    Attributes
-    ----------
-    torque : ndarray (12,)
-        τ_fb in the order of the joint names [N m].
-    shift_in_base : ndarray (4, 3)
-        Foot placement shifts for swinging feet [m].
-    drift_in_base : ndarray (4, 2)
-        What standing feet add to the velocity of their paths [m/s].
-    correction : ndarray (3,)
-        What the legs add to the reference velocity of the stance feet: v_x, v_y [m/s], γ [rad/s].
-    command : BodyCommand
-        What the body does.
-    measured : ndarray (12,)
-        Measured joint angles that the feedback was made of [rad].
-    foot_force : ndarray (4,)
-        Measured normal forces of the feet [N]; 0 where there is none to be believed.
-    felt : tuple of 4 bool
-        Whose joints were measured; those of other legs are planned.
-    margins : tuple of float
-        Of the capture point to the edges of the support polygon [m]; ``WIDE`` while nobody asks.
-    progress : Progress or None
-        Whether the body comes ahead, where it balances, and how rough its ground is.
-    level : tuple of 4 float
-        How far over the plane that the body follows the feet are to stand [m].
-    """
-
-    torque: Array
-    shift_in_base: Array
-    drift_in_base: Array
-    correction: Array
-    command: BodyCommand = STANDING
-    measured: Array = field(default_factory=lambda: np.zeros(12))
-    foot_force: Array = field(default_factory=lambda: np.zeros(4))
-    margins: tuple[float, ...] = WIDE
-    progress: Progress | None = None
-    felt: tuple[bool, ...] = FELT
-    level: tuple[float, ...] = LEVEL_FEET
-
-    def of_leg(self, i: int) -> LegFeedback:
-        """What the path of leg ``i`` takes of it."""
-        return LegFeedback(
-            self.measured[3 * i : 3 * i + 3], self.shift_in_base[i], self.drift_in_base[i],
-            self.correction, float(self.foot_force[i]),
-            self.level[i], self.progress.rough if self.progress else 0.0)
 
 
 class PostureState(NamedTuple):
@@ -135,6 +83,33 @@ class PostureState(NamedTuple):
     plan: MotionPlan = MotionPlan()
     offset: MassOffset = MassOffset()
     terrain: Terrain = NOTHING_FELT
+
+
+class Stride(NamedTuple):
+    """What the gait has the legs do in a tick.
+
+    Attributes
+    ----------
+    reference : tuple of float
+        v_x, v_y [m/s], γ [rad/s].
+    omega, own_omegas, duty : float, sequence of four floats, float
+        Rates of the cycle and of those of the legs [rad/s], and share of stance.
+    positions : list of four floats
+        In the cycle when the targets act, 0 at mid-swing, ±1/2 at mid-stance.
+    activity, moving : ndarray (4,), float
+        Swing activity of the legs, and its mean.
+    load : list of four floats
+        What the feet carry, in shares.
+    """
+
+    reference: Triple
+    omega: float
+    own_omegas: Sequence[float]
+    duty: float
+    positions: list[float]
+    activity: Array
+    moving: float
+    load: list[float]
 
 
 class PostureController:
@@ -207,101 +182,127 @@ class PostureController:
         feedback : PostureFeedback
         """
         p, leg_length = self.parameters, self.scale.leg_length
-        reference, omega, own_omegas, duty = gait.pace(r, self.scale)
-        rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]
-        activity = activities_step(memory.activity, rates, own_omegas, p.activity_rate, dt)
-        swings = activity.tolist()
-        positions = [gait.scalar_cycle_position(scalar_phase(x_1, x_2) + p.target_lead * rate)
-                     for (x_1, x_2), rate in zip(x.tolist(), rates, strict=True)]
-        load = virtual_model.contact_weights(positions, duty, swings, p.load_transfer)
+        stride = self._stride(memory.activity, gait, x, x_dot, r, dt)
         R_ground_base, upward = ground_from_base(
             state, p.slope_following * memory.terrain.followed)
         felt = state.felt_legs
         if felt is not None:
             if state.feels_nothing:
                 R_ground_base = LEVEL_WITH_GROUND
-            state = as_planned(state, self.kinematics, self._nominal, reference, own_omegas, duty,
-                               positions)
+            state = as_planned(state, self.kinematics, self._nominal, stride.reference,
+                               stride.own_omegas, stride.duty, stride.positions)
         velocity = vec3.times(R_ground_base, vec3.triple(state.base_velocity_in_base.tolist()))
         rate = vec3.times(R_ground_base, vec3.triple(state.base_rate_in_base.tolist()))
-        moving = sum(swings) / len(swings)
-        plan = memory.plan.followed(reference, moving, self.model.push_rate(p),
+        plan, integral, offset = self._slow_loops(
+            memory, stride, R_ground_base, state.base_quaternion, velocity, dt)
+        correction = integral.acting(p, leg_length, stride.moving)
+        planned = vec3.plus(stride.reference, correction)
+        sway = self._sway(stride)
+        measured = (velocity[0], velocity[1] - sway.velocity, rate[2])
+        under = lean(upward, self.model.height)
+        beside = self._beside(under, plan, offset)
+        legs = self.legs.at(state.joint_position.tolist())
+        com = vec3.plus(self._com_in_base, (*offset.place, 0.0))
+        feet = [vec3.times(R_ground_base, vec3.minus(foot, com)) for foot, _ in legs]
+        body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, stride.load))
+        acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
+        lasting = integral.lasting(p, leg_length, plan)
+        error = (measured[0] - (planned[0] - lasting[0]), measured[1] - (planned[1] - lasting[1]))
+        terrain, level = self._ground(
+            memory, state, R_ground_base[2], legs, stride, gait, measured, dt)
+        return PostureState(stride.activity, integral, plan, offset, terrain), PostureFeedback(
+            self._torque(body, legs, feet, stride, planned, self._bounce(gait, stride),
+                         acceleration),
+            self._shift(stride, gait, measured, planned, beside, R_ground_base),
+            np.array(self.placement.drift(
+                self.placement.yielding(p, stride.reference[0], gait.firm), measured, planned,
+                stride.activity.tolist(), sway.velocity)),
+            np.array(correction), command, state.joint_position, believed(state.foot_force),
+            self._margins(R_ground_base, feet, stride, under, error),
+            Progress((measured[0], measured[1]), feet_behind(
+                plan.expected, beside, feet, self._footholds, stride.positions, stride.duty,
+                stride.omega), terrain.rough, terrain.gaps), felt or FELT, level)
+
+    def _stride(self, activity: Array, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
+                dt: float) -> Stride:
+        """What the gait has the legs do, from their activity one tick before."""
+        p = self.parameters
+        reference, omega, own_omegas, duty = gait.pace(r, self.scale)
+        rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]
+        activity = activities_step(activity, rates, own_omegas, p.activity_rate, dt)
+        swings = activity.tolist()
+        positions = [gait.scalar_cycle_position(scalar_phase(x_1, x_2) + p.target_lead * rate)
+                     for (x_1, x_2), rate in zip(x.tolist(), rates, strict=True)]
+        load = virtual_model.contact_weights(positions, duty, swings, p.load_transfer)
+        return Stride(reference, omega, own_omegas, duty, positions, activity,
+                      sum(swings) / len(swings), load)
+
+    def _slow_loops(self, memory: PostureState, stride: Stride, R_ground_base: Matrix,
+                    quaternion: Array, velocity: Triple, dt: float
+                    ) -> tuple[MotionPlan, VelocityCorrection, MassOffset]:
+        """Plan of the body's motion, and what is learned of its errors."""
+        p, leg_length, moving = self.parameters, self.scale.leg_length, stride.moving
+        plan = memory.plan.followed(stride.reference, moving, self.model.push_rate(p),
                                     p.friction * GRAVITY, dt)
         integral = memory.integral.integrated(
-            p, leg_length, moving, state.base_quaternion.tolist(), velocity, plan,
-            reference[2], dt)
-        offset = memory.offset.found(p, leg_length, moving, R_ground_base, dt)
+            p, leg_length, moving, quaternion.tolist(), velocity, plan, stride.reference[2], dt)
+        return plan, integral, memory.offset.found(p, leg_length, moving, R_ground_base, dt)
+
+    def _beside(self, under: Pair, plan: MotionPlan, offset: MassOffset) -> Pair:
+        """How far from their footholds a slope, a curve and an offset have the feet [m]."""
+        lean_x, lean_y = under
+        slope_lean, outside = self.parameters.slope_lean, -self.model.height / GRAVITY
         aside_x, aside_y = offset.place
-        com_x, com_y, com_z = self._com_in_base
-        com_in_base = com_x + aside_x, com_y + aside_y, com_z
-        correction = integral.acting(p, leg_length, moving)
-        sway = self._sway(positions, duty, omega, reference, moving)
-        measured = (velocity[0], velocity[1] - sway.velocity, rate[2])
-        planned = vec3.plus(reference, correction)
-        lasting = integral.lasting(p, leg_length, plan)
-        lean_x, lean_y = lean(upward, self.model.height)
-        outside = -self.model.height / GRAVITY
-        beside = (p.slope_lean * lean_x + outside * plan.curve[0] + aside_x,
-                  p.slope_lean * lean_y + outside * plan.curve[1] + aside_y)
+        return (slope_lean * lean_x + outside * plan.curve[0] + aside_x,
+                slope_lean * lean_y + outside * plan.curve[1] + aside_y)
+
+    def _shift(self, stride: Stride, gait: GaitInForce, measured: Triple, planned: Triple,
+               beside: Pair, R_ground_base: Matrix) -> Array:
+        """Shift of the footholds of swinging feet, ndarray (4, 3) [m]."""
+        p, (beside_x, beside_y) = self.parameters, beside
         caught = self.placement.caught(measured, planned, gait.apart)
-        beside_x, beside_y = beside
         shift = [
             (along + beside_x, across + beside_y) for along, across in self.placement.shift(
-                p, caught, planned, pi * duty / omega)]
+                p, caught, planned, pi * stride.duty / stride.omega)]
         raised = self.placement.raised(p, shift, R_ground_base)
-        legs = self.legs.at(state.joint_position.tolist())
-        feet = [vec3.times(R_ground_base, vec3.minus(foot, com_in_base)) for foot, _ in legs]
-        body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
-        bounce = self._bounce(gait, positions, duty, omega, moving)
-        acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
-        terrain, level = self._ground(
-            memory.terrain, state, R_ground_base[2], legs,
-            [position / (1.0 - duty) + 0.5 for position in positions], gait, (reference, measured),
-            [resting(*of) for of in zip(swings, memory.activity.tolist(), strict=True)], dt
-        ) if p.climbing else (NOTHING_FELT, LEVEL_FEET)
-        return PostureState(activity, integral, plan, offset, terrain), PostureFeedback(
-            self._torque(body, legs, feet, load, planned, bounce, acceleration),
-            np.array([part for (x, y), up in zip(shift, raised, strict=True)
-                      for part in (x, y, up)]).reshape(-1, 3),
-            np.array(self.placement.drift(
-                self.placement.yielding(p, reference[0], gait.firm), measured, planned, swings,
-                sway.velocity)),
-            np.array(correction), command, state.joint_position, believed(state.foot_force),
-            self._margins(R_ground_base, feet, swings, (lean_x, lean_y), (
-                measured[0] - (planned[0] - lasting[0]),
-                measured[1] - (planned[1] - lasting[1]))),
-            Progress((measured[0], measured[1]), feet_behind(
-                plan.expected, beside, feet, self._footholds, positions, duty, omega),
-                terrain.rough, terrain.gaps), felt or FELT, level)
+        return np.array([part for (x, y), up in zip(shift, raised, strict=True)
+                         for part in (x, y, up)]).reshape(-1, 3)
 
-    def _ground(self, terrain: Terrain, state: RobotState, normal_in_base: Triple,
-                legs: Sequence[tuple[Triple, Matrix]], swung: Sequence[float],
-                gait: GaitInForce, velocities: Sequence[Triple], rests: Sequence[bool], dt: float
-                ) -> tuple[Terrain, tuple[float, ...]]:
+    def _ground(self, memory: PostureState, state: RobotState, normal_in_base: Triple,
+                legs: Sequence[tuple[Triple, Matrix]], stride: Stride, gait: GaitInForce,
+                measured: Triple, dt: float) -> tuple[Terrain, tuple[float, ...]]:
         """Memory of the ground, and heights of the feet over the plane with a normal that the body
         follows [m]; a body tells a first step at low velocities (v_x, v_y [m/s], γ [rad/s]) of the
         reference and its own only.
         """
+        if not self.parameters.climbing:
+            return NOTHING_FELT, LEVEL_FEET
         R_world_base = vec3.rotation(state.base_quaternion.tolist())
         place = vec3.triple(state.base_position_in_world.tolist())
         n = vec3.times(R_world_base, normal_in_base)
         limit = SLOW * self.scale.speed(gait.highest(self.scale))
         calm = (gait.firm >= 1.0 and abs(vec3.dot(n, vec3.times(R_world_base, LEFT))) < ROLLING
-                and all(self.scale.foot_speed(*velocity) < limit for velocity in velocities))
-        touches, rests = contacts(state, rests, legs, self._quarter_weight)
-        quiet = self.scale.foot_speed(*velocities[1]) < self.scale.speed(QUIET)
-        return terrain.felt(
+                and all(self.scale.foot_speed(*velocity) < limit
+                        for velocity in (stride.reference, measured)))
+        swung = [position / (1.0 - stride.duty) + 0.5 for position in stride.positions]
+        touches, rests = contacts(
+            state, [resting(*of) for of in zip(
+                stride.activity.tolist(), memory.activity.tolist(), strict=True)],
+            legs, self._quarter_weight)
+        quiet = self.scale.foot_speed(*measured) < self.scale.speed(QUIET)
+        return memory.terrain.felt(
             place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot, _ in legs],
             n, swung, touches, self.scale.leg_length, calm,
             all(end.steps == len(LEGS) for end in gait.ends), rests, quiet * dt)
 
-    def _margins(self, R_ground_base: Matrix, feet: list[Triple], swings: list[float],
+    def _margins(self, R_ground_base: Matrix, feet: list[Triple], stride: Stride,
                  under: Pair, error: Pair) -> tuple[float, ...]:
         """Margins of the capture point with an error of the velocity [m/s]; legs that swing count
         at their footholds.
         """
         places = []
-        for foot, foothold, swing in zip(feet, self._footholds, swings, strict=True):
+        for foot, foothold, swing in zip(
+                feet, self._footholds, stride.activity.tolist(), strict=True):
             place = vec3.times(R_ground_base, foothold)
             places.append(vec3.moved(foot, vec3.minus(place, foot), swing))
         return support_margins(
@@ -315,31 +316,31 @@ class PostureController:
         carried = sum(share * z for share, z in zip(load, heights, strict=True))
         return self.foot_radius - carried / total
 
-    def _bounce(self, gait: GaitInForce, positions: list[float], duty: float, omega: float,
-                moving: float) -> Bounce:
+    def _bounce(self, gait: GaitInForce, stride: Stride) -> Bounce:
         """Planned bounce of the body: what the legs give way to, in the mean."""
-        if gait.bounce(positions[0], duty, omega) is LEVEL:  # wherever the legs are
+        duty, omega = stride.duty, stride.omega
+        if gait.bounce(stride.positions[0], duty, omega) is LEVEL:  # wherever the legs are
             return LEVEL
-        each = [gait.bounce(position, duty, omega) for position in positions]
-        share = moving / len(each)
+        each = [gait.bounce(position, duty, omega) for position in stride.positions]
+        share = stride.moving / len(each)
         return Bounce(*(share * sum(values) for values in zip(*each, strict=True)))
 
-    def _sway(self, positions: list[float], duty: float, omega: float, reference: Triple,
-              moving: float) -> virtual_model.LateralPlan:
+    def _sway(self, stride: Stride) -> virtual_model.LateralPlan:
         """Planned sway of the body; it fades with the legs' activity and with speed sideways."""
-        sway = virtual_model.lateral_plan(positions, duty, omega, self._across, self.model.height)
+        sway = virtual_model.lateral_plan(
+            stride.positions, stride.duty, stride.omega, self._across, self.model.height)
         if sway is virtual_model.STRAIGHT:
             return virtual_model.STRAIGHT
-        sideways = abs(reference[1]) / self.scale.speed(virtual_model.SIDEWAYS)
-        share = moving * max(0.0, 1.0 - sideways)
+        sideways = abs(stride.reference[1]) / self.scale.speed(virtual_model.SIDEWAYS)
+        share = stride.moving * max(0.0, 1.0 - sideways)
         return virtual_model.LateralPlan(*(share * value for value in sway))
 
     def _torque(self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
-                load: list[float], r: Triple, bounce: Bounce, acceleration: Pair) -> Array:
+                stride: Stride, r: Triple, bounce: Bounce, acceleration: Pair) -> Array:
         """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
         force, moment = self.model.wrench(self.parameters, body, r, bounce, acceleration)
         forces = distribute(
-            force, moment, feet, load, self.parameters.friction,
+            force, moment, feet, stride.load, self.parameters.friction,
             LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
         torques: list[float] = []
         for on_foot, (_, J) in zip(forces, legs, strict=True):
