@@ -61,6 +61,11 @@ FORK_SERVER = fork_server_file.encode()
 SHARED_HZ = 100.0
 """Control rate of a suite beside which tests ask, command and look on; it is certified too."""
 
+BY_ITSELF = 'looking after itself'
+"""Part of the refusal of a robot that has come to a stand by itself, as it does for a moment where
+targets are late on a loaded machine.
+"""
+
 ASK_AGAIN_S = 3.0
 """Time after which a request that may be repeated is repeated."""
 
@@ -308,6 +313,18 @@ class Ros:
         self.spin_until(answered, deadline_s, what=lambda: f'answer of {name}')
         self.node.destroy_client(client)
         return next(future for future in futures if future.done()).result()
+
+    def granted(self, service_type: Any, name: str, request: Any) -> Any:
+        """Call a service until it agrees, which a robot that looks after itself does later."""
+        answers: list[Any] = []
+
+        def agreed() -> bool:
+            answers.append(self.call(service_type, name, request))
+            assert answers[-1].success or BY_ITSELF in answers[-1].message, answers[-1].message
+            return bool(answers[-1].success)
+
+        self.spin_until(agreed, RUN_S, what=lambda: f'{name}: {answers[-1].message}')
+        return answers[-1]
 
     def collect(self, message_type: Any, topic: str, qos: Any = 10, *,
                 raw: bool = False) -> list[Any]:
