@@ -9,6 +9,7 @@ import os
 import subprocess
 import sys
 from collections import Counter
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -35,16 +36,26 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line('markers', 'flaky(reruns=1): run once more when it fails')
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with what takes long: workers that share the tests then end at the same time. What
-    starts processes in real time is run once more when it fails, for the machine may have had no
-    time for it; the summary tells of it.
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Begin with what takes long, in every worker: they then end at the same time.
+
+    Each gets an equal part of the list, from its begin to its end, and takes over the last ones of
+    another who has more left. So every part begins with files that take long and ends with others.
+    What starts processes in real time is run once more when it fails, for the machine may have had
+    no time for it; the summary tells of it.
     """
     def rank(item: pytest.Item) -> int:
         folder = item.path.relative_to(Path(__file__).parent).parts[0]
         return LONG.index(folder) if folder in LONG else len(LONG)
 
-    items.sort(key=rank)
+    workers = getattr(config, 'workerinput', {}).get('workercount', 1)
+    parts: list[list[pytest.Item]] = [[] for _ in range(workers)]
+    for number, (_, tests) in enumerate(groupby(sorted(items, key=rank), lambda of: of.path)):
+        together = list(tests)
+        takes_long = rank(together[0]) < len(LONG)
+        part = parts[number % workers] if takes_long else min(parts, key=len)
+        part.extend(together)
+    items[:] = [item for part in parts for item in part]
     for item in items:
         if 'ros_processes' in {getattr(value, '__module__', '') for value in vars(
                 getattr(item, 'module', object)).values()}:
