@@ -18,7 +18,7 @@ import numpy as np
 from dmp_cpg_ros.core.clock import fresh
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.modes.falls import BodySense, FallParameters
-from dmp_cpg_ros.core.modes.motion_library import RISE, Movements, lying_posture
+from dmp_cpg_ros.core.modes.motion_library import RISE, lying_posture, time_unit
 from dmp_cpg_ros.core.primitives.demonstration import minimum_jerk
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets, RobotState
@@ -134,7 +134,7 @@ class CommandWatchdog:
         self.stamps: list[int | None] = [None] * len(LEGS)
         self.fallback = self.leaving = ''
         self._sense, self._stance_height = BodySense(description), description.stance_height
-        lying, unit = lying_posture(description), Movements(description).time_unit
+        lying, unit = lying_posture(description), time_unit(description)
         self._ways = {'stand': (home_joint_position(description), STAND_S),
                       'lie': (lying, RISE * unit), 'drop': (lying, DROP * unit)}
         self._way = ''

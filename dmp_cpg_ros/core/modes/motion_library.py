@@ -24,6 +24,7 @@ table serves robots of any size.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import asin, atan2, cos, hypot, sin, sqrt
@@ -102,6 +103,11 @@ def learned(path: Array) -> DiscretePrimitive:
     return learn_discrete(Demonstration(np.linspace(0.0, 1.0, len(path)), path), BASES)
 
 
+def time_unit(description: RobotDescription) -> float:
+    """√(l/g), in which durations are told [s]."""
+    return sqrt(body_scale(description).leg_length / GRAVITY)
+
+
 @dataclass(frozen=True, eq=False)
 class Movement:
     """One movement of all joints.
@@ -138,10 +144,10 @@ class Movements:
 
     def __init__(self, description: RobotDescription) -> None:
         """Derive the postures."""
-        self.time_unit = unit = sqrt(body_scale(description).leg_length / GRAVITY)
+        self.time_unit = unit = time_unit(description)
         self.pause = PAUSE * unit
         shares = minimum_jerk(np.linspace(0.0, 1.0, PATH_SAMPLES))
-        rise = np.array([raised_posture(description, share) for share in shares])
+        rise = raised_postures(description, shares)
         tucked = _posture(description, 'left', TUCKED, TUCKED)
         lying, standing = lying_posture(description), standing_posture(description)
         movements = [
@@ -186,6 +192,11 @@ def lying_posture(description: RobotDescription) -> Array:
 
 
 def raised_posture(description: RobotDescription, share: float) -> Array:
+    """Joint angles (12,) at a share of the way from lying to standing [rad]."""
+    return np.array(raised_postures(description, (share,))[0])
+
+
+def raised_postures(description: RobotDescription, shares: Sequence[float] | Array) -> Array:
     """Joint angles on the way from lying to standing.
 
     The height rises linearly with the share, and the feet slide from beside the hips to their
@@ -195,27 +206,28 @@ def raised_posture(description: RobotDescription, share: float) -> Array:
     ----------
     description : RobotDescription
         The robot.
-    share : float
+    shares : sequence of m floats
         0: on the belly; 1: standing.
 
     Returns
     -------
-    ndarray (12,)
+    ndarray (m, 12)
         [rad]
     """
     low, high = description.belly_depth, description.stance_height
-    height = low + (high - low) * share
     angles = []
     for leg in description.legs:
-        foot = nominal_foothold(description, leg.name)
-        foot[:2] += (1.0 - share) ** 2 * (_lying_foot(leg, low) - foot)[:2]
-        foot[2] = leg.foot_radius - height
-        angles.append(within_limits(leg, LegKinematics(leg).inverse(foot)))
-    return np.concatenate(angles)
+        kinematics, foot = LegKinematics(leg), nominal_foothold(description, leg.name)
+        x, y, _ = foot.tolist()
+        aside_x, aside_y, _ = (_lying_foot(leg, low) - foot).tolist()
+        feet = [(x + (1.0 - share) ** 2 * aside_x, y + (1.0 - share) ** 2 * aside_y,
+                 leg.foot_radius - (low + (high - low) * share)) for share in shares]
+        angles.append(within_limits(leg, np.array([kinematics.angles(at) for at in feet])))
+    return np.hstack(angles)
 
 
 def within_limits(leg: LegGeometry, angles: Array) -> Array:
-    """Clip a leg's angles (3,) to its joint limits less ``LIMIT_MARGIN`` [rad]."""
+    """Clip a leg's angles (..., 3) to its joint limits less ``LIMIT_MARGIN`` [rad]."""
     return np.clip(angles, leg.position_lower + LIMIT_MARGIN, leg.position_upper - LIMIT_MARGIN)
 
 
