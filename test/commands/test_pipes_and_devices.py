@@ -36,7 +36,7 @@ def never_waits() -> Iterator[None]:
     before, usual = signal.signal(signal.SIGALRM, tell), resource.getrlimit(resource.RLIMIT_AS)
     pages = int(Path('/proc/self/statm').read_text(encoding='utf-8').split()[0])
     resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + 2**31, usual[1]))
-    signal.alarm(20)
+    signal.alarm(120)
     yield
     signal.alarm(0)
     resource.setrlimit(resource.RLIMIT_AS, usual)

@@ -98,13 +98,13 @@ def test_any_file_is_read_or_refused_in_one_line(kind: str, tmp_path: Path) -> N
         for new in (garbled(data, chance),
                     yaml.safe_dump(changed(content, chance), sort_keys=False).encode()):
             path.write_bytes(new)
-            begin = time.monotonic()
+            begin = time.process_time()  # a loaded machine is no failure
             try:
                 load(path)
             except DmpCpgError as error:
                 refused += 1
                 assert '\n' not in str(error), str(error)
-            assert time.monotonic() - begin < LONGEST_S, new
+            assert time.process_time() - begin < LONGEST_S, new
     assert 0 < refused < 2 * count
 
 
