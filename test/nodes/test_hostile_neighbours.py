@@ -541,9 +541,9 @@ def test_transitions_that_are_not_possible_are_refused(
     ended(process)
 
 
-@pytest.mark.parametrize(('kind', 'numbers'), zip(KINDS, cycle((
+@pytest.mark.parametrize(('kind', 'numbers'), [*zip(KINDS, cycle((
     (signal.SIGINT, signal.SIGTERM, signal.SIGINT),
-    (signal.SIGTERM, signal.SIGINT, signal.SIGTERM)))), ids=lambda given: (
+    (signal.SIGTERM, signal.SIGINT, signal.SIGTERM))), strict=False)], ids=lambda given: (
         given if isinstance(given, str) else given[0].name))
 def test_an_interrupt_ends_a_lone_node_without_complaint(
     processes: Processes, ros: Ros, tmp_path: Path, kind: str, numbers: tuple[int, ...]
