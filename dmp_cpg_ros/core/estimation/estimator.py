@@ -17,13 +17,14 @@ judged by its joint torques, and without IMU the standing feet tell how the body
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import exp, hypot, isfinite
+from math import exp, hypot, inf, isfinite
 
 import numpy as np
 
 from dmp_cpg_ros.core.clock import time_step
 from dmp_cpg_ros.core.estimation import frozen, leg_odometry, mid_stride, velocity_filter
 from dmp_cpg_ros.core.estimation.body_estimate import BodyEstimate
+from dmp_cpg_ros.core.estimation.imu_watch import NEW, ImuWatch
 from dmp_cpg_ros.core.estimation.leg_odometry import FootMotion, TerrainState, normal_in_world
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.estimation.velocity_filter import FilterState
@@ -43,6 +44,9 @@ turning. Also the gap between ticks beyond which readings do not stand for their
 
 BLIND_NOISE = {'gyro_noise': 0.3, 'accelerometer_noise': 3.0}
 """Noise densities of such guesses instead of the IMU's [rad/s/√Hz], [m/s²/√Hz]."""
+
+LEVELLING = 3.0
+"""Rate at which a vertical without IMU follows the plane of the feet [1/s]."""
 
 INITIAL_DEVIATION = (0.05, 0.1, 0.005, 0.1)
 """Of attitude [rad], velocity [m/s], biases of gyroscope [rad/s] and accelerometer [m/s^2]."""
@@ -83,6 +87,8 @@ class EstimatorState:
         Time for which the robot has stood still [s].
     watch : SensorWatch
         For sensors that freeze.
+    imu : ImuWatch
+        For an IMU that contradicts the feet.
     """
 
     filter: FilterState
@@ -92,6 +98,7 @@ class EstimatorState:
     blind: float
     still: float
     watch: frozen.SensorWatch
+    imu: ImuWatch = NEW
 
 
 class BodyEstimator:
@@ -133,7 +140,8 @@ class BodyEstimator:
         """
         if memory is None or readings.time_ns <= memory.estimate.time_ns:
             return self._begin(readings)
-        watch, readings = frozen.without_frozen(memory.watch, readings)
+        watch, told = frozen.without_frozen(memory.watch, readings)
+        readings = frozen.without_imu(told) if memory.imu.doubted_s else told
         dt = time_step(memory.estimate.time_ns, readings.time_ns)
         seeing = readings.imu_is_usable
         blind = 0.0 if seeing and dt <= BLIND else memory.blind + dt
@@ -151,6 +159,9 @@ class BodyEstimator:
         state, _ = velocity_filter.update(
             state, rate, motion.contact_in_base, motion.velocity_in_base, trust, noise)
         rests = seeing and min(trust) > 0.0 and _is_still(readings, state)
+        if blind > BLIND:
+            state = replace_unchecked(state, quaternion=leg_odometry.levelled_by_feet(
+                state.quaternion, memory.terrain, LEVELLING * dt))
         still = memory.still + dt if rests else 0.0
         if still > STILL_TIME:
             state = velocity_filter.settle(state, rate, STILL_DEVIATION)
@@ -160,10 +171,18 @@ class BodyEstimator:
             problems, state = (*problems, 'filter'), memory.filter
         terrain, estimate = self._finished(
             memory, state, readings.time_ns, rate, noise.gyro_noise**2 / dt, motion, trust,
-            problems)
+            blind > BLIND, problems)
         if problems:
             estimate = replace_unchecked(estimate, readings=frozen.with_joints(watch, readings))
-        return EstimatorState(state, terrain, estimate, rate, blind, still, watch), estimate
+        imu = memory.imu.followed(
+            memory.filter, state, terrain.slope, told, vec3.triple(rate.tolist()), dt)
+        if imu.doubted_s and not memory.imu.doubted_s:
+            state, slope = memory.imu.unspoilt(state, terrain.slope)
+            terrain = replace_unchecked(terrain, slope=slope)
+            if any(trust):
+                state = replace_unchecked(state, velocity_in_base=mid_stride.velocity_of_feet(
+                    motion, rate - state.gyro_bias, trust))
+        return EstimatorState(state, terrain, estimate, rate, blind, still, watch, imu), estimate
 
     def resumed(self, memory: EstimatorState, readings: SensorReadings
                 ) -> tuple[EstimatorState, BodyEstimate]:
@@ -256,7 +275,8 @@ class BodyEstimator:
 
     def _finished(
         self, memory: EstimatorState, state: FilterState, time_ns: int, rate: Array,
-        rate_noise: float, motion: FootMotion, trust: list[float], problems: tuple[str, ...],
+        rate_noise: float, motion: FootMotion, trust: list[float], blind: bool,
+        problems: tuple[str, ...],
     ) -> tuple[TerrainState, BodyEstimate]:
         """Integrate the position, follow the ground, and put the estimate together."""
         last = memory.estimate
@@ -270,7 +290,7 @@ class BodyEstimator:
         contact = [vec3.times(R, place) for place in motion.contact_in_base]
         terrain = leg_odometry.terrain_step(
             memory.terrain, [vec3.plus(position, place) for place in contact], trust, dt,
-            self.parameters.terrain_time)
+            inf if blind else self.parameters.terrain_time)
         normal = normal_in_world(terrain.slope)
         height, weight = last.height + vec3.dot(normal, velocity) * dt, sum(trust)
         if weight > 0.0:

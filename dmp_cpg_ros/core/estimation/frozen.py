@@ -261,6 +261,11 @@ def _without(readings: SensorReadings, imu: bool, legs: ArrayLike, contacts: Arr
         np.where(contacts, np.nan, readings.foot_force))
 
 
+def without_imu(readings: SensorReadings) -> SensorReadings:
+    """Readings in which those of the IMU are missing (NaN)."""
+    return _without(readings, True, (False,) * N, (False,) * N)
+
+
 def _told(watch: SensorWatch, readings: SensorReadings, now: int) -> SensorReadings:
     """Readings to compare the next ones with: a frozen sensor's are those that it still tells."""
     return replace_unchecked(readings, time_ns=now, **{

@@ -25,7 +25,17 @@ from typing import NamedTuple
 import numpy as np
 
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, cross, minus, times, triple
+from dmp_cpg_ros.core.maths.rotations import turned
+from dmp_cpg_ros.core.maths.vec3 import (
+    Matrix,
+    Triple,
+    cross,
+    minus,
+    rotation,
+    times,
+    transposed_times,
+    triple,
+)
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 
@@ -230,6 +240,30 @@ def fitted_slope(points: Sequence[Sequence[float]]) -> tuple[float, float]:
     a, b = (yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant
     scale = min(1.0, STEEPEST / max(hypot(a, b), 1e-12))
     return a * scale, b * scale
+
+
+def levelled_by_feet(quaternion: Array, terrain: TerrainState, share: float) -> Array:
+    """Orientation turned by a share of the angle by which the newest footholds seem to leave the
+    plane: with a vertical that is only integrated, on ground that goes on as it was, it is the
+    body's own that has drifted.
+
+    Parameters
+    ----------
+    quaternion : ndarray (4,)
+        x, y, z, w.
+    terrain : TerrainState
+        Footholds, and the slope that is believed.
+    share : float
+        Of the angle.
+
+    Returns
+    -------
+    ndarray (4,)
+    """
+    (x, y), (x_now, y_now) = terrain.slope, fitted_slope(terrain.foothold_in_world)
+    turn = transposed_times(rotation(quaternion.tolist()),
+                            (share * (y - y_now), share * (x_now - x), 0.0))
+    return turned(quaternion, np.array(turn))
 
 
 def normal_in_world(slope: tuple[float, float]) -> Triple:
