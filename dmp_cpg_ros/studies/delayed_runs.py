@@ -18,7 +18,7 @@ PATTERNS = ('one age', 'edges', 'kept', 'kept from inhibited', 'chosen')
 """How ages are distributed and vary."""
 
 _CHOICES = 12  # ages of which one is chosen
-_MOST_RUNS = 4  # times as long as rest is waited for where something moves
+_MOST_RUNS = 6  # times as long as rest is waited for where something moves
 
 
 def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random.Generator
@@ -31,8 +31,8 @@ def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random
         What is captured.
     kind : str
         ``late`` for the switch; of samples ``held``, ``carried``, and what nothing certifies:
-        ``held at once`` from the entry on and not before, so that they lag by more than a walk with
-        them lets them, and ``always carried``, in C too.
+        ``held at once`` from the entry on and not before, so that they lag by more than a walk
+        with them lets them, and ``always carried``, in C too.
     ages : ndarray (count,)
         Largest ages [s].
     pattern : str
@@ -50,7 +50,7 @@ def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random
         acts = run.acts()
         run.judge(acts, tick)
         run.advance(acts)
-        if run.note_way(tick) and not np.any(run.moves & ~run.bad):
+        if run.note_way(tick) and np.all(run.rests | run.bad):
             break
     return (run.bad | ~run.acted | run.moves) & ~run.aside
 
@@ -83,7 +83,8 @@ class _DelayedRun:
         self.steps = int(rest / self._step)
         self._walk_up_to_the_region(capture.omega / (1.0 + degree * ages * (kind == 'held')), rng)
         self._draw_ages(rng)
-        self._farthest, self._from = np.zeros((4, count)), self._z
+        self._way = self._end_way = np.full(count, np.inf)
+        self._from = self._end_from = self._z
         self._backwards = np.full(count, -len(self._past))
         self._inside = np.full(self._z.shape, -1)    # ticks since nodes came into C, or -1
         self.acted, self.bad, self.aside = np.zeros((3, count), dtype=bool)
@@ -180,20 +181,27 @@ class _DelayedRun:
         return np.asarray((self._rho * (r * r - np.abs(z) ** 2) + 1j * self._capture.omega) * z)
 
     def note_way(self, tick: int) -> bool:
-        """Note the largest distance from where each quarter of the run began; whether it is over.
-        """
-        quarter = 4 * (tick % self.steps) // self.steps
-        if quarter != 4 * ((tick - 1) % self.steps) // self.steps:
-            self._from, self._farthest[quarter] = self._z, 0.0
-        np.maximum(self._farthest[quarter], np.abs(self._z - self._from).max(axis=1),
-                   out=self._farthest[quarter])
-        return (tick + 1) % self.steps == 0
+        """Note how far nodes go in a run and in its last quarter; whether it is over."""
+        now, last = tick % self.steps, 3 * self.steps // 4
+        if now == 0:
+            self._before, self._way, self._from = self._way, np.zeros(len(self._way)), self._z
+        if now == last:
+            self._end_way, self._end_from = np.zeros(len(self._way)), self._z
+        np.maximum(self._way, np.abs(self._z - self._from).max(axis=1), out=self._way)
+        if now >= last:
+            np.maximum(self._end_way, np.abs(self._z - self._end_from).max(axis=1),
+                       out=self._end_way)
+        return now == self.steps - 1
+
+    @property
+    def rests(self) -> NDArray[np.bool_]:
+        """Whether nothing has moved far in the last quarter, (count,)."""
+        return np.asarray(self._end_way < 3e-3 * self._capture.radius)
 
     @property
     def moves(self) -> NDArray[np.bool_]:
-        """Whether something moves in the last quarter as far as it did before, (count,)."""
-        second, last = self._farthest[1], self._farthest[3]
-        return np.asarray((last > 0.9 * second) & (last > 1e-3 * self._capture.radius))
+        """Whether something has moved as far as in the run before, (count,)."""
+        return np.asarray(~self.rests & (self._way > 0.9 * self._before))
 
 
 def chosen_ages(away: Complex, past: Complex, now: int, most: NDArray[np.int_],

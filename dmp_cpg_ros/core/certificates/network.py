@@ -294,4 +294,4 @@ def delay_inequalities(capture: Capture, tick_s: float) -> list[Inequality]:
             "with an oscillator per node that holds the others' states "
             f'(at {slower:.3g} times the period) capture would bear'),
         row('carried_coupling', carried_margin(capture), 'age of states',
-            'with states that are carried on by the flow of the gait, at its cadence, it would bear')]
+            'with states that are carried on by the flow of the gait, at its pace, it would bear')]

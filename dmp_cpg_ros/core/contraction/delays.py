@@ -10,10 +10,10 @@ in any way, the distances from the target obey in locked coordinates
 This is a comparison system with no negative feedback that is late: a box is invariant when it is
 without delay and the samples lie in it too (Halanay's inequality; Smith 1995, *Monotone Dynamical
 Systems*, chapter 5), and differences of solutions vanish whenever those of the undelayed system
-do. What limits d are the samples from before the capture. Held as they are they lag; carried on by
-the flow of the gait, ŷ_j = e^(iφ) y_j with φ the turn of ω over the age until the receiver came into
-C, they do not: that is where the free flow ends, and every solution of the gait, walking and at
-rest, is one of the network with delays.
+do. What limits d are the samples from before the capture. Held as they are they lag; carried on
+by the flow of the gait, ŷ_j = e^(iφ) y_j with φ the turn of ω over the age until the receiver came
+into C, they do not: there the free flow ends. Locked legs walk, and captured ones rest, as they do
+without delay.
 """
 
 from __future__ import annotations
@@ -214,8 +214,8 @@ def carried_margin(capture: Capture) -> float:
 
     ŷ_j = e^(iφ) y_j(t − d), where φ is what ω turns by over the age, but for the part of it after
     the receiver itself came into C with inhibition armed. All nodes come there at about one time:
-    older samples are then where their nodes were at that time, in their places, and lag by nothing,
-    and younger ones are as they were taken, as without an age.
+    older samples are then where their nodes were at that time, in their places, so that nothing
+    lags, and younger ones are as they were taken.
 
     Parameters
     ----------

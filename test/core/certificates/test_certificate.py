@@ -46,6 +46,12 @@ def test_the_defaults_hold_for_every_gait_and_graph(gait: str, graph: str) -> No
     assert found.time_to_rest < 4.0 and found.time_to_walking < 1.0
 
 
+def test_the_defaults_bear_a_tick_and_a_lost_message_late_held_or_carried_on() -> None:
+    found = certificate()
+    for name in ('late_inhibition', 'held_coupling', 'carried_coupling'):
+        assert found[name].left == pytest.approx(3.0 * TICK) and found[name].holds
+
+
 @pytest.mark.parametrize('leg', ['fl', 'fr', 'rl', 'rr'])
 def test_any_one_of_the_legs_can_hold_the_others(leg: str) -> None:
     assert certificate(suite=with_inhibition(inhibited_legs=(leg,))).holds

@@ -12,7 +12,7 @@ import pytest
 from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.contraction.delays import Capture
 from dmp_cpg_ros.studies.delayed_runs import PATTERNS, fails
-from dmp_cpg_ros.studies.delays import MARGINS, capture_of, random_captures
+from dmp_cpg_ros.studies.delays import MARGINS, capture_of, gait_captures, random_captures
 
 
 def captured(graph: str = 'all_to_all', k: float = 100.0, omega: float = 12.2,
@@ -67,6 +67,13 @@ def test_capture_with_carried_states_does_not_depend_on_their_age(graph: str) ->
     assert MARGINS['carried'](capture) == np.inf
     for pattern in PATTERNS:
         assert not fails(capture, 'carried', np.geomspace(0.01, 0.1, 4), pattern, rng).any()
+
+
+def test_any_age_of_carried_states_is_certified_where_capture_is() -> None:
+    gaits = [MARGINS['carried'](capture) for _, capture in gait_captures()]
+    drawn = random_captures(np.random.default_rng(1), 200)
+    assert gaits == [np.inf] * 28
+    assert [MARGINS['carried'](capture) for _, capture in drawn] == [np.inf] * 200
 
 
 def test_states_that_are_carried_on_in_the_region_too_lead_out_of_it() -> None:
