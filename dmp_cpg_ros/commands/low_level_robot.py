@@ -107,10 +107,11 @@ class LowLevelTopics:
         self.on_command: Callable[[], None] = lambda: None
         self.targets_ns = [-1] * len(LEGS)
         self._node, self._last = node, interfaces[-1]
-        self._names = list(robot.joint_names if order is None else order)
-        known = [name for name in self._names if name in robot.joint_names]
-        self._places = [self._names.index(name) for name in known]
+        names = list(robot.joint_names if order is None else order)
+        known = [name for name in names if name in robot.joint_names]
+        self._places = [names.index(name) for name in known]
         self._joints = [robot.joint_names.index(name) for name in known]
+        self._messages = Imu(), WrenchStamped(), JointState(name=names)
         for name in interfaces:
             node.create_subscription(Float64MultiArray, commands_of(name), self._taker(name), 100)
         self._imu = node.create_publisher(Imu, f'{IMU_BROADCASTER}/imu', 10)
@@ -150,25 +151,24 @@ class LowLevelTopics:
 
     def publish(self) -> None:
         """Tell what is measured, the joints last."""
-        state, imu = self.robot.state, Imu()
+        state, imu, wrench, joints = self.robot.state, *self._messages
         q, rate, force = imu.orientation, imu.angular_velocity, imu.linear_acceleration
         q.x, q.y, q.z, q.w = state.base_quaternion.tolist()
         rate.x, rate.y, rate.z = state.base_rate_in_base.tolist()
         force.x, force.y, force.z = state.acceleration_in_base.tolist()
-        set_stamp(imu.header.stamp, state.time_ns)
+        for message in self._messages:
+            set_stamp(message.header.stamp, state.time_ns)
         self._imu.publish(imu)
         for publisher, size in zip(self._feet, state.foot_force.tolist(), strict=True):
-            wrench = WrenchStamped()
-            wrench.header.stamp = imu.header.stamp
             wrench.wrench.force.z = size
             publisher.publish(wrench)
-        told = np.zeros((3, len(self._names)))
+        told = np.zeros((3, len(joints.name)))
         told[:, self._places] = np.array(
             (state.joint_position, state.joint_velocity, self._felt * state.joint_effort)
         )[:, self._joints]
-        position, velocity, effort = (array('d', row.tobytes()) for row in told)
-        joints = JointState(name=self._names, position=position, velocity=velocity, effort=effort)
-        joints.header.stamp = imu.header.stamp
+        # Arrays of their type are taken as they are; of a list, every entry is looked at.
+        joints.position, joints.velocity, joints.effort = (
+            array('d', row.tobytes()) for row in told)
         self._states.publish(joints)
 
 
