@@ -768,7 +768,7 @@ def test_an_environment_that_ros_refuses_is_named_in_a_line(
         processes: Processes, tmp_path: Path, command: tuple[str, ...], variable: str, value: str,
         valid: str) -> None:
     out = ('--out', str(tmp_path / 'run')) if command[0] == 'walk' else ()
-    process = processes.python('-m', 'dmp_cpg_ros', *command, *out, **{variable: value})
+    process = processes.start(*command, *out, forked=True, **{variable: value})
     ended(process, 2, f'{command[0]}: ', valid)
 
 

@@ -54,6 +54,15 @@ ALIKE = {('link', 'garbage'): ('link', 'off'), ('node', 'off'): ('link', 'off'),
 """Failures of which the robot is sent the same as in another one."""
 
 
+def is_tried(cell: tuple[str, str, str]) -> bool:
+    """Whether a cell is tried here, where each failure is in one of the gaits, as the squares of a
+    board alternate: a cell takes a second and a half. The study tries them all.
+    """
+    gait, component, kind = cell
+    turn = [*COMPONENTS].index(component) + [*KINDS].index(kind)
+    return gait == GAITS[turn % len(GAITS)] or cell in NAMES
+
+
 @cache
 def outcome(gait: str, failure: tuple[str, str]) -> Outcome:
     return trial(Case(gait, *failure))
@@ -62,6 +71,8 @@ def outcome(gait: str, failure: tuple[str, str]) -> Outcome:
 def test_the_table_has_every_cell() -> None:
     assert set(table()) == set(product(GAITS, COMPONENTS, KINDS))
     assert set(NAMES) <= set(EXPECTED)
+    tried = [cell[1:] for cell in filter(is_tried, EXPECTED)]
+    assert set(tried) == {cell[1:] for cell in EXPECTED} and len(tried) < 0.6 * len(EXPECTED)
 
 
 @pytest.mark.parametrize('failure, other', ALIKE.items())
@@ -79,7 +90,7 @@ def test_failures_that_are_alike_send_the_robot_the_same(
         np.testing.assert_equal(*sent)
 
 
-@pytest.mark.parametrize('cell', EXPECTED, ids=' '.join)
+@pytest.mark.parametrize('cell', [*filter(is_tried, EXPECTED)], ids=' '.join)
 def test_every_failure_ends_as_the_table_says(cell: tuple[str, str, str]) -> None:
     gait, *failure = cell
     found = outcome(gait, ALIKE.get(tuple(failure), tuple(failure)))

@@ -134,13 +134,12 @@ events:
 """
 
 
-@pytest.mark.parametrize('shared', ['--composed', '--processes=each'])
 def test_no_node_accepts_what_the_gait_that_is_still_walked_does_not_bear(
-    processes: Processes, tmp_path: Path, shared: str
+    processes: Processes, tmp_path: Path
 ) -> None:
     settings = {'physics': 'perfect_tracking', 'gait': 'bound', 'control_rate': SHARED_HZ}
     process = processes.walk(
-        HANDED_OVER, tmp_path / 'run', '--lock-step', shared, *(
+        HANDED_OVER, tmp_path / 'run', '--lock-step', '--processes=each', *(
             item for name, value in settings.items() for item in ('--set', f'{name}:={value}')))
     assert process.wait(RUN_S) == 0, str(process)
     refusals = re.findall(r'refused: (.*)', process.output)

@@ -165,7 +165,7 @@ def test_a_low_level_interface_walks_stops_and_is_left_alone_safely(
 
     session.speed = 0.4
     start = robot.state.base_position_in_world[0]
-    session.run_until(lambda: robot.state.base_position_in_world[0] > start + 0.4, 6.0)
+    session.run_until(lambda: robot.state.base_position_in_world[0] > start + 0.25, 6.0)
     answer = ros.call(SetBool, 'inhibit', SetBool.Request(data=True))
     assert answer.success and 'at rest in' in answer.message
     session.run_until(lambda: isfinite(float(session.stop.get('measured_s', 'nan'))), 4.0)
@@ -175,7 +175,7 @@ def test_a_low_level_interface_walks_stops_and_is_left_alone_safely(
     session.comes_to_rest(1.5)
 
     assert ros.call(SetBool, 'inhibit', SetBool.Request(data=False)).success
-    session.run(1.0)
+    session.run(0.5)
     assert not session.at_rest
     assert ros.call(SetBool, f'{DRIVER}/enable', SetBool.Request(data=False)).success
     session.run_until(lambda: session.heard['drive_mode'] == 'stand', 1.0)
@@ -183,7 +183,7 @@ def test_a_low_level_interface_walks_stops_and_is_left_alone_safely(
 
     assert ros.call(SetBool, f'{DRIVER}/enable', SetBool.Request(data=True)).success
     session.run_until(lambda: session.heard['drive_mode'] == 'following', 6.0)
-    session.run(1.0)
+    session.run(0.5)
     assert not session.at_rest
     session.suite.kill()
     session.silent = True

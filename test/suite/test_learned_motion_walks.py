@@ -23,7 +23,7 @@ from dmp_cpg_ros.primitive_files import (
 )
 from dmp_cpg_ros.suite import load_suite
 
-SPEEDS = (0.3, 0.5, 0.8)
+SPEEDS = (0.3, 0.8)
 
 
 @pytest.fixture(scope='module')

@@ -24,7 +24,7 @@ def captured(graph: str = 'all_to_all', k: float = 100.0, omega: float = 12.2,
 
 
 @pytest.mark.parametrize('kind', MARGINS)
-@pytest.mark.parametrize('graph', ['all_to_all', 'star', 'directed_ring'])
+@pytest.mark.parametrize('graph', ['star', 'directed_ring'])
 def test_no_certified_delay_fails(kind: str, graph: str) -> None:
     capture, rng = captured(graph, omega=20.0), np.random.default_rng(1)
     certified = MARGINS[kind](capture)

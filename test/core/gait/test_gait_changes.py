@@ -70,9 +70,9 @@ class Walker:
         return [name for k, name in enumerate(names) if k == 0 or name != names[k - 1]]
 
 
-@pytest.mark.parametrize('later', [0.0, 0.35, 0.6])
-@pytest.mark.parametrize(('before', 'after'), [('amble', 'trot'), ('trot', 'bound'),
-                                               ('pronk', 'walk')])
+@pytest.mark.parametrize(('before', 'after', 'later'), [
+    *(('amble', 'trot', later) for later in (0.0, 0.35, 0.6)), ('trot', 'bound', 0.35),
+    ('pronk', 'walk', 0.35)])
 def test_a_stop_within_a_transition_is_predicted_bounded_and_comes_to_rest(
         before: str, after: str, later: float) -> None:
     walker = Walker(before)

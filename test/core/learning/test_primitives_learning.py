@@ -43,9 +43,9 @@ def test_25_bases_reproduce_a_movement_to_less_than_one_percent(name, method, re
     assert learning_discrete.reproduction_errors(learned, demonstration).max() < 0.01
 
 
-@pytest.mark.parametrize('method', ['response', 'joint', 'local'])
-@pytest.mark.parametrize('recorded', ['positions', 'everything'])
-def test_25_bases_reproduce_a_rhythm_to_less_than_one_percent(method, recorded):
+@pytest.mark.parametrize(('recorded', 'method'), [
+    ('everything', 'response'), *(('positions', of) for of in ('response', 'joint', 'local'))])
+def test_25_bases_reproduce_a_rhythm_to_less_than_one_percent(recorded, method):
     demonstration = (
         walking_joints() if recorded == 'everything' else positions_only(walking_joints())
     )
