@@ -5,11 +5,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from dmp_cpg_ros.configuration import naming
+from dmp_cpg_ros.configuration import naming, readable
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
@@ -40,6 +41,9 @@ _PLACE_OF_LEG = {'fl': (1, 1), 'fr': (1, -1), 'rl': (-1, 1), 'rr': (-1, -1)}  # 
 BISECTIONS = 30
 """Of the search for the rolling radius of the feet."""
 
+MOST_KEPT = 100_000
+"""Largest model whose description is kept [bytes]."""
+
 
 def load_description(path: Path | str | None = None) -> RobotDescription:
     """Read a robot's description.
@@ -56,7 +60,25 @@ def load_description(path: Path | str | None = None) -> RobotDescription:
     """
     with naming(path or OWN_ROBOT):
         file = load_robot_file(path)
-        return read_description(load_model(file.model, file.base), file)
+        text = _whole(file.model)
+        return _described(file, text) if text else _described.__wrapped__(file, text)
+
+
+def _whole(model: Path) -> bytes:
+    """Text of a model that names no other file; nothing of another one."""
+    if not readable(model).is_file():
+        return b''
+    with model.open('rb') as stream:
+        text = stream.read(MOST_KEPT + 1)
+    return b'' if len(text) > MOST_KEPT or b'file' in text else text
+
+
+@lru_cache(maxsize=8)
+def _described(file: RobotFile, text: bytes) -> RobotDescription:
+    """Description that nobody changes, made once of the same text: all nodes of a process read it,
+    and those that are forked have it before they begin.
+    """
+    return read_description(load_model(file.model, file.base), file)
 
 
 def pose(model: mujoco.MjModel, ids: ModelIds, joint_position: Array) -> mujoco.MjData:

@@ -9,6 +9,7 @@ import os
 import numpy as np
 import pytest
 
+from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.robot.model_loader import load_model
@@ -214,3 +215,24 @@ def test_the_inertia_that_a_swing_moves_is_that_of_the_leg_about_its_hip():
         # that of a stance in which feet are not rolled over yet
         assert leg.swing_inertia == pytest.approx(2.0 * data.energy[1] / 2.0**2, rel=2e-3)
         assert leg.swing_inertia > leg.rotor_inertia[1]
+
+
+def test_a_model_that_has_changed_since_it_was_read_is_read_again(tmp_path):
+    """Also where only a file of it has changed."""
+    text = own_robot_file().model.read_text(encoding='utf-8')
+    begin, end = text.index('<mujoco'), text.rindex('</mujoco>')
+    inside = text[text.index('>', begin) + 1:end]
+    model, part, file = (tmp_path / name for name in ('robot.xml', 'part.xml', 'robot.yaml'))
+    usual = find_config('mini_quadruped', ROBOTS).read_text(encoding='utf-8')
+    file.write_text(usual.replace('mini_quadruped.xml', 'robot.xml'), encoding='utf-8')
+    heavier = 'mass="3.52"', 'mass="4.52"'
+    assert heavier[0] in inside
+    for whole in (True, False):
+        masses = []
+        for content in (inside, inside.replace(*heavier)):
+            part.write_text(f'<mujoco>{content}</mujoco>', encoding='utf-8')
+            model.write_text(f'<mujoco>{content}</mujoco>' if whole else
+                             '<mujoco><include file="part.xml"/></mujoco>', encoding='utf-8')
+            masses.append(load_description(file).mass)
+            assert load_description(file).mass == masses[-1]
+        assert masses[1] - masses[0] == pytest.approx(1.0)
