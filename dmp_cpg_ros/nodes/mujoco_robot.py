@@ -230,6 +230,7 @@ class MujocoRobotNode(DrivenRobot):
             targets = self._faults.driven(targets)
         self.watch_silence(now)
         self.watch_joints()
+        self._robot.without_power = self._guard.drives.lame
         try:
             self._state = self._robot.step(targets)
         except RobotError as error:
@@ -382,6 +383,11 @@ class MujocoRobotNode(DrivenRobot):
     def has_drives(self) -> bool:
         """Joints that are exactly where they are told to be need none."""
         return self._options.physics == 'mujoco'
+
+    @property
+    def cuts_power(self) -> bool:
+        """As the enable lines of real drives do, whatever these are told."""
+        return self.has_drives
 
     @property
     def _file(self) -> Path:

@@ -184,7 +184,8 @@ class BodyState:
             name: at for name, at in seen.items() if stamp_ns - WELL_AGAIN_NS <= at <= stamp_ns}
         if estimate.problems:
             self._node.warn('sensors', 'the estimator does without '
-                            f'{", ".join(sorted(problems))}: silent, not finite, or impossible')
+                            f'{", ".join(sorted(problems))}: silent, not finite, impossible, or '
+                            'not what the others tell')
         elif not problems:
             self._node.clear('sensors')
 

@@ -7,7 +7,9 @@ A drive with power gives it, a weak one a part of it; one without power gives no
 follows anything but the targets gives what has nothing to do with it. So does not follow whoever
 reports, over the last few hundredths of a second, ∫ τ τ* < 0.15 ∫ τ*² while much is asked. A leg
 is limp whose three joints move and give nothing; one that has given what nobody asked for has
-power, and carries.
+power, and carries. One is wild whose torques vary by much that has nothing to do with τ*: the
+smaller of their variance and ∫ τ² − (∫ τ τ*)² / ∫ τ*². Limp or wild, a leg is lame: the robot lies
+down, and cuts the leg off where it can.
 """
 
 from __future__ import annotations
@@ -34,6 +36,12 @@ torques: nothing is said of drives that never did.
 
 LIMP = 0.15
 """Share of the squared torques asked for below which a leg gives none."""
+
+WILD = 0.55
+"""What varies and follows nothing of a leg's torques, in squared limits, summed over its joints,
+from which its drives give anything: full torque this way and that throws a robot over within a
+tenth of a second. In walks on rough ground torques vary as much, as they are asked to.
+"""
 
 MOVES = 0.5
 """Joint speed above which a leg without torque is not one that is held [rad/s]."""
@@ -67,8 +75,12 @@ class DriveWatch:
         motors do that are told both at a rate of their own; those of the simulator stop there.
     failing : tuple of str
         Joints, by the robot's names, that do not follow or did not lately.
-    limp : bool
-        Whether a leg moves without giving torque that is asked of it, or did lately.
+    cuts : bool
+        Whether lame legs are without power: drives that give anything are to be cut off, and a
+        robot that only lies down with one of them is thrown over from its belly.
+    lame : tuple of str
+        Legs that move without giving torque that is asked of them, or did lately; where they are
+        cut off, also those that give torques that change wildly.
     """
 
     def __init__(self, description: RobotDescription) -> None:
@@ -81,15 +93,15 @@ class DriveWatch:
         self._goes = np.zeros(len(self._names))  # velocities that the drives still follow
         self._told_ns = 0
         self._reports = False
-        self.watches, self.keeps_velocity = True, False
+        self.watches, self.keeps_velocity, self.cuts = True, False, False
         self._failed_ns = np.full(len(self._names), -WELL_NS)
         self.failing: tuple[str, ...] = ()
         # Means over squared limits: τ* by both laws, friction, τ; τ*² by both (the second first),
         # τ τ* by both, τ², q̇².
         self._means, self._news = np.zeros((2, 10, len(self._names)))
         self._strange_ns = np.full(len(LEGS), -STRANGE_NS)
-        self._limp_ns = -WELL_NS
-        self.limp = False
+        self._lame_ns = np.full(len(LEGS), -WELL_NS)
+        self.lame: tuple[str, ...] = ()
 
     def tell(self, time_ns: int, targets: JointTargets) -> None:
         """Keep what the joints are told at a stamp [ns]."""
@@ -146,6 +158,13 @@ class DriveWatch:
         self._strange_ns = np.where(strange > STRANGE * STRANGE, now, self._strange_ns)
         limp = ((asked > MUCH * MUCH) & (np.maximum(reported, explained) < LIMP * asked)
                 & (moves > MOVES * MOVES) & (now - self._strange_ns > STRANGE_NS))
-        if self._reports and limp.any():
-            self._limp_ns = now
-        self.limp = now - self._limp_ns < WELL_NS
+        followed = (np.maximum(means[6:8], 0.0) ** 2 / np.maximum(means[5:3:-1], 1e-9)).max(axis=0)
+        kicks = np.minimum(means[8] - mean * mean, means[8] - followed)
+        wild = kicks.reshape(len(LEGS), -1).sum(axis=1) > WILD
+        lame = (limp | (wild & self.cuts)) & self._reports
+        if lame.any():
+            self._lame_ns = np.where(lame, now, self._lame_ns)
+        elif not self.lame:
+            return
+        lately = now - self._lame_ns < WELL_NS
+        self.lame = tuple(leg for leg, of in zip(LEGS, lately, strict=True) if of)

@@ -18,7 +18,7 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.grounds import World
 from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
-from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.robot_model.world import height_over_ground
 from dmp_cpg_ros.core.scenario.push import HOLD_NS, PushForce, PushQueue
 from dmp_cpg_ros.robot import model_parts
@@ -117,6 +117,8 @@ class MujocoRobot:
     data : mujoco.MjData
     base : int
         Its base among the model's bodies.
+    without_power : tuple of str
+        Legs whose drives give no torque, whatever they are told.
 
     Raises
     ------
@@ -150,6 +152,7 @@ class MujocoRobot:
             self.description, self._steps, self._step_s, model.dof_damping[self._dof])
         mismatch = mismatch or MismatchParameters()
         self._strength = np.array(mismatch.joint_strength)
+        self.without_power: tuple[str, ...] = ()
         if mismatch != MismatchParameters():
             model_parts.differ(model, ids, self._dof, mismatch, self.description.mass)
         self._contacts = model_parts.ContactReader(model, ids)
@@ -220,6 +223,8 @@ class MujocoRobot:
         self._drive.accept(targets)
         self._begin_push()
         model, data, drive, strength = self.model, self.data, self._drive, self._strength
+        if self.without_power:
+            strength = strength * [leg not in self.without_power for leg in np.repeat(LEGS, 3)]
         qpos, qvel, step, dof = data.qpos, data.qvel, mujoco.mj_step, self._dof
         R_world_base = data.xmat[self.base].reshape(3, 3)  # a view, of the step's begin
         torques, velocities, rotations = self._torques, self._velocities, self._rotations

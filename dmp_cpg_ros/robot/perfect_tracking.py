@@ -54,6 +54,7 @@ class PerfectTrackingRobot:
         self._legs = [LegKinematics(leg) for leg in description.legs]
         self._radius = np.array([leg.foot_radius for leg in description.legs])
         self._home = poses[start_pose](description)
+        self.without_power: tuple[str, ...] = ()  # of no effect: there are no drives
         self.reset()
 
     def reset(self, time_ns: int = 0) -> RobotState:

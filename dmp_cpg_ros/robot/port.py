@@ -24,7 +24,11 @@ class Robot(Protocol):
         What the controllers may know of it.
     tick_ns : int
         Length of a control tick [ns].
+    without_power : tuple of str
+        Legs whose drives are cut off, and give no torque whatever they are told.
     """
+
+    without_power: tuple[str, ...]
 
     @property
     def description(self) -> RobotDescription:

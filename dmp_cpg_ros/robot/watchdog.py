@@ -5,10 +5,10 @@
 A walking robot goes on with the rhythm of its last cycle, in steps that become smaller until it
 stands; without a rhythm it holds its joints for 0.1 s and puts its feet down. A standing robot
 holds its stance. One that is upright but low (on its way up or down, or on its belly) is lowered
-onto its belly. So is one with a leg that gives no torque, as fast as it would fall: three legs do
-not carry a body that moves, and from its belly nothing falls. The joints of a tilted one are
-damped. Targets are followed again when they rest where the joints are, or a step away where the
-robot stands, and act in time.
+onto its belly. So is one with a lame leg, which gives no torque or anything, as fast as it would
+fall: three legs do not carry a body that moves, and from its belly nothing falls. The joints of a
+tilted one are damped. Targets are followed again when they rest where the joints are, or a step
+away where the robot stands, and act in time.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ before the robot tips over to its side.
 """
 
 DROP = 1.5
-"""Time in which it is lowered from a stand when a leg is limp, in √(l/g); falling takes 1.3."""
+"""Time in which it is lowered from a stand when a leg is lame, in √(l/g); falling takes 1.3."""
 
 STOP_CYCLES = 2.0
 """Periods of its last rhythm in which a walking robot comes to a stand by itself."""
@@ -221,7 +221,7 @@ class CommandWatchdog:
         if self.lateness_ns > CARRIED_NS:
             self._lagged_ns = now
         self._losing = self.lost > (LITTLE if self._losing else BORNE)
-        if self.drives.limp or self.silent(now) or self._astray() or (
+        if self.drives.lame or self.silent(now) or self._astray() or (
                 self.fallback and known and not self._at_ease(now)):
             return self._falling_back(state)
         if self.fallback:
@@ -303,12 +303,12 @@ class CommandWatchdog:
         """Targets of the fallback that the robot's state asked for when it began; a robot that
         tips over meanwhile is damped.
         """
-        now, limp = state.time_ns, self.drives.limp
+        now, lame = state.time_ns, bool(self.drives.lame)
         if self.fallback != 'damp' and self._sense.condition(state).tilt > self._tilt:
             self.fallback = 'damp'
-        elif not self.fallback or (limp and (self.fallback, self._way) in SLOWER):
+        elif not self.fallback or (lame and (self.fallback, self._way) in SLOWER):
             self._begin_falling_back(state)
-        if limp or self.silent(now):
+        if lame or self.silent(now):
             self._uneasy_ns = now
         if self.fallback == 'damp':
             return JointTargets(state.joint_position.copy(), np.zeros(12), np.zeros(12))
@@ -318,12 +318,12 @@ class CommandWatchdog:
 
     def _begin_falling_back(self, state: RobotState) -> None:
         """Choose what the robot's state asks for."""
-        now, stands, limp = state.time_ns, self._stands(state), self.drives.limp
-        self.fallback = 'stand' if stands and not limp else 'lie'
-        self._way = 'drop' if limp else self.fallback
+        now, stands, lame = state.time_ns, self._stands(state), bool(self.drives.lame)
+        self.fallback = 'stand' if stands and not lame else 'lie'
+        self._way = 'drop' if lame else self.fallback
         known = None not in self.stamps
         start = np.array((self._given if known else state.joint_position, *np.zeros((2, 12))))
-        if known and not self._late_ns and not limp:
+        if known and not self._late_ns and not lame:
             self._going_on(now, start)
         self._begin_ns = self._uneasy_ns = now
         self._late_ns, self._start = 0, start

@@ -120,6 +120,7 @@ class FailingWalk:
         self.injector = FaultInjector(0)
         self.watchdog = CommandWatchdog(
             self.robot.description, round(suite.robot.target_timeout * 1e9))
+        self.watchdog.drives.cuts = True
         self.state, self.named, self.tilt = self.robot.reset(), set[str](), 0.0
         self._ticks = TickInputs(self._on_tick, ('robot',), 'robot')
         self._sent: list[Message] = []
@@ -168,6 +169,7 @@ class FailingWalk:
         self.loop.told_drive(guard.fallback)
         if injector.acting:
             self.named.update(f'joint {name}' for name in guard.drives.failing)
+        self.robot.without_power = guard.drives.lame
         self.state = self.robot.step(injector.driven(targets))
 
     def _on_tick(self, stamp_ns: int, inputs: Mapping[str, Any]) -> None:

@@ -12,6 +12,7 @@ import pytest
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets
+from dmp_cpg_ros.core.scenario.fault import Fault
 from dmp_cpg_ros.robot.drive_watch import DriveWatch
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies.failures import FailingWalk, walking
@@ -106,3 +107,24 @@ def test_drives_that_never_reported_a_torque_are_not_judged() -> None:
             watch.see(replace(state, time_ns=tick * robot.tick_ns, joint_effort=effort))
             watch.tell(tick * robot.tick_ns, targets)
         assert len(watch.failing) == (12 if reports else 0)
+
+
+@pytest.mark.parametrize('cuts', [True, False])
+def test_a_leg_that_kicks_is_lame_at_once_where_it_can_be_cut_off(cuts: bool) -> None:
+    walk = copied('amble', 0.5)
+    walk.watchdog.drives.cuts = cuts
+    walk.injector.add(Fault('joint', 'garbage', 1.0, 'fr'), walk.state.time_ns)
+    walk.run(0.04)
+    assert walk.watchdog.drives.lame == (('fr',) if cuts else ())
+    assert {name[:2] for name in walk.watchdog.drives.failing} == {'fr'}
+    assert walk.robot.without_power == walk.watchdog.drives.lame
+
+
+def test_a_leg_without_power_gives_no_torque_whatever_it_is_told() -> None:
+    robot = MujocoRobot()
+    state, still = robot.reset(), np.zeros(12)
+    robot.without_power = ('rl',)
+    for _ in range(10):
+        state = robot.step(JointTargets(state.joint_position + 0.3, still, still))
+        assert not state.joint_effort[6:9].any()
+        assert state.joint_effort[:6].all() and state.joint_effort[9:].all()

@@ -94,7 +94,10 @@ def test_a_step_of_a_leg_that_rests_is_believed_after_a_moment() -> None:
     (('amble', 'link', 'wrong'), 103), (('amble', 'node', 'stuck'), 103),
     (('amble', 'node', 'garbage'), 104),
     (('trot', 'node', 'delayed'), 103), (('amble', 'imu', 'garbage'), 101),
-    (('trot', 'imu', 'slow'), 104)])
+    (('trot', 'imu', 'slow'), 104), (('trot', 'imu', 'wrong'), 103),
+    (('trot', 'imu', 'wrong'), 104), (('amble', 'imu', 'wrong'), 104),
+    (('amble', 'joint', 'garbage'), 200), (('trot', 'joint', 'garbage'), 205),
+    (('amble', 'joint', 'stuck'), 203), (('trot', 'joint', 'stuck'), 200)])
 def test_failures_that_made_a_walk_fall_do_not(cell: tuple[str, str, str], seed: int) -> None:
     outcome = trial(drawn(cell, seed, [Case._field_defaults['robot']]))
     assert outcome.end != 'falls'

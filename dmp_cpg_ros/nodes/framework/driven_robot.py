@@ -61,6 +61,7 @@ class DrivenRobot(SuiteNode):
                                       if self.lossy else 0, self.return_ns)
         self._guard.drives.watches = self.has_drives
         self._guard.drives.keeps_velocity = self.keeps_velocity
+        self._guard.drives.cuts = self.cuts_power
 
     @property
     def has_drives(self) -> bool:
@@ -70,6 +71,11 @@ class DrivenRobot(SuiteNode):
     @property
     def keeps_velocity(self) -> bool:
         """Whether the drives are told velocities at a rate of their own."""
+        return False
+
+    @property
+    def cuts_power(self) -> bool:
+        """Whether it takes the power from the drives of lame legs."""
         return False
 
     def watchdog_values(self) -> dict[str, Any]:
@@ -134,9 +140,11 @@ class DrivenRobot(SuiteNode):
         if not failing:
             self.clear('joints')
             return
-        limp = '; the robot lowers itself onto its belly' if self._guard.drives.limp else ''
+        lame = self._guard.drives.lame
+        cut = f', and {", ".join(lame)} is without power' if self.cuts_power else ''
+        rest = f'; the robot lowers itself onto its belly{cut}' if lame else ''
         self.warn('joints', f'joint {", ".join(failing)} does not follow: the torque that its '
-                  f'drive reports is not what its targets ask for{limp}', error=True)
+                  f'drive reports is not what its targets ask for{rest}', error=True)
 
     def tell_drive(self, fallback: str) -> None:
         """Say whether the joints follow the legs, or what the robot does by itself."""
