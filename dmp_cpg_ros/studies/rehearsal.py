@@ -146,32 +146,48 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _main(options: argparse.Namespace, _: RosArguments) -> int:
+    cores: dict[str, float] = {}
+    refused = ''
     with folder_of_logs(options.logs) as folder, alone_in_domain(''), ForkServer() as server:
         group = ProcessGroup(folder, server)
         try:
             robot = Rehearsal(group, folder, options.rate, options.longest_lag)
-            robot.enable()
-            robot.becomes('drive_mode', 'following')
-            robot.tell('stand_up')
-            robot.becomes('body_mode', 'standing')
-            before = robot.used()
-            robot.tell('cmd_vel', f'{options.speed:g}', '--for', f'{options.seconds:g}')
-            after = robot.used()
-            robot.becomes('body_mode', 'standing')
-            robot.tell('inhibit')
-            robot.tell('disable')
+            try:
+                cores = _walk(robot, options.speed, options.seconds)
+            except RehearsalError as error:
+                refused = str(error)
             results = robot.end()
-        except RehearsalError as error:
-            print(f'rehearsal: {error}', file=sys.stderr)
-            return 1
         finally:
             group.stop(WITHIN_S)
-    cores = {name: between(before[name], after[name]).cpu_s / options.seconds for name in after}
     print(f'\n{told(results)}')
-    print('cores while it walked: ' + ', '.join(
-        f'{name} {used:.2f}' for name, used in cores.items()))
-    write_results(options.json, {**results, 'cores': cores})
-    return 0
+    if cores:
+        print('cores while it walked: ' + ', '.join(
+            f'{name} {used:.2f}' for name, used in cores.items()))
+    write_results(options.json, {**results, 'cores': cores, 'refused_step': refused})
+    if refused:
+        print(f'rehearsal: {refused}', file=sys.stderr)
+    return int(bool(refused))
+
+
+def _walk(robot: Rehearsal, speed: float, seconds: float) -> dict[str, float]:
+    """Go through the steps; returns the cores that the processes took while it walked.
+
+    Raises
+    ------
+    RehearsalError
+        At the first step that is refused.
+    """
+    robot.enable()
+    robot.becomes('drive_mode', 'following')
+    robot.tell('stand_up')
+    robot.becomes('body_mode', 'standing')
+    before = robot.used()
+    robot.tell('cmd_vel', f'{speed:g}', '--for', f'{seconds:g}')
+    after = robot.used()
+    robot.becomes('body_mode', 'standing')
+    robot.tell('inhibit')
+    robot.tell('disable')
+    return {name: between(before[name], after[name]).cpu_s / seconds for name in after}
 
 
 if __name__ == '__main__':

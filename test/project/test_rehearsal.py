@@ -108,10 +108,25 @@ def test_the_study_walks_and_says_what_was_held(
     assert status == 0, said
     measured = json.loads(file.read_text(encoding='utf-8'))
     assert measured['moved_m'] > 0.1 and measured['refused'] == 0
+    assert measured['refused_step'] == ''
     assert measured['states_hz'] > 0.0 and measured['commands_hz'] > 0.0
     assert set(measured['cores']) == {ROBOT, 'ros2_control_driver', 'composed_suite'}
     assert 'real-time factor' in said.out and 'body_mode: standing' in said.out
     assert {log.stem for log in (tmp_path / 'logs').iterdir()} == set(measured['cores'])
+
+
+def test_a_step_that_is_refused_costs_no_figure(
+        ros_domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / 'measured.json'
+    monkeypatch.setattr(rehearsal, 'COMES_WITHIN_S', 5.0)
+    becomes = rehearsal.Rehearsal.becomes
+    monkeypatch.setattr(rehearsal.Rehearsal, 'becomes', lambda robot, topic, state: becomes(
+        robot, topic, 'flying' if topic == 'drive_mode' else state))
+    assert rehearsal.main([*PATIENT, '--rate', str(SHARED_HZ), '--json', str(file)]) == 1
+    said, measured = capsys.readouterr(), json.loads(file.read_text(encoding='utf-8'))
+    assert 'drive_mode is not flying' in said.err and 'real-time factor' in said.out
+    assert 'flying' in measured['refused_step'] and measured['states_hz'] > 0.0
 
 
 def test_what_is_no_command_is_refused_and_the_robot_goes_on(
