@@ -230,7 +230,9 @@ def carried_margin(capture: Capture) -> float:
         0 without a certificate, infinite otherwise: capture does not depend on the age.
     """
     r, r0, p, held = capture.radius, capture.region_radius, capture.places, capture.held
-    if not (capture.undelayed.holds and capture.contracts(p) and capture.radii < r):
+    ahead = float(capture.coupling.sum(axis=1).max()) * p       # what places may pull back by
+    if not (capture.undelayed.holds and capture.contracts(p) and capture.radii < r
+            and ahead <= capture.omega * r * (1.0 + 1e-9)):
         return 0.0
     crossed = min(_arc(r, R, r0) * R for R in (r - capture.radii, r + capture.radii))
     pull = float(capture.coupling[:, held].sum(axis=1).max()) * p
