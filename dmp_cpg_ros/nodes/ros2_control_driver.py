@@ -43,6 +43,7 @@ from dmp_cpg_ros.nodes.messages.robot_state import (
 )
 from dmp_cpg_ros.nodes.messages.values import checked, header_ns, sensed
 from dmp_cpg_ros.robot.joint_drive import JointDrive
+from dmp_cpg_ros.robot.watchdog import CARRIED_NS
 from dmp_cpg_ros.suite_table import DRIVER, KINDS
 
 FRESH_NS = 100_000_000
@@ -128,6 +129,11 @@ class Ros2ControlDriver(DrivenRobot):
     def keeps_velocity(self) -> bool:
         """Whether motors take a velocity beside the angle, with each command."""
         return {'position', 'velocity'} <= set(self._joint_publishers)
+
+    @property
+    def acts_late_ns(self) -> int:
+        """As late as targets are borne: commands go over topics and a bus."""
+        return CARRIED_NS
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Timing, and whether the joints are commanded and follow the legs."""

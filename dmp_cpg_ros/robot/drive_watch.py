@@ -10,10 +10,14 @@ is limp whose three joints move and give nothing; one that has given what nobody
 power, and carries. One is wild whose torques vary by much that has nothing to do with τ*: the
 smaller of their variance and ∫ τ² − (∫ τ τ*)² / ∫ τ*². Limp or wild, a leg is lame: the robot lies
 down, and cuts the leg off where it can.
+
+Motors behind a bus act by commands of some periods ago, nobody knows how many. Of them τ* is what
+is nearest to τ between all that the targets of that time have asked for.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from math import exp
 
 import numpy as np
@@ -73,6 +77,8 @@ class DriveWatch:
     keeps_velocity : bool
         Whether drives go on with a velocity that they are told again with the same angle, as
         motors do that are told both at a rate of their own; those of the simulator stop there.
+    late_ns : int
+        Age of the oldest targets by which drives may still act [ns]; 0 where they act by the last.
     failing : tuple of str
         Joints, by the robot's names, that do not follow or did not lately.
     cuts : bool
@@ -93,7 +99,8 @@ class DriveWatch:
         self._goes = np.zeros(len(self._names))  # velocities that the drives still follow
         self._told_ns = 0
         self._reports = False
-        self.watches, self.keeps_velocity, self.cuts = True, False, False
+        self._before: deque[tuple[int, Array, Array]] = deque()  # what was told before that
+        self.watches, self.keeps_velocity, self.cuts, self.late_ns = True, False, False, 0
         self._failed_ns = np.full(len(self._names), -WELL_NS)
         self.failing: tuple[str, ...] = ()
         # Means over squared limits: τ* by both laws, friction, τ; τ*² by both (the second first),
@@ -108,6 +115,8 @@ class DriveWatch:
         told, last = np.array((targets.position, targets.velocity, targets.effort)), self._told
         held = False if last is None or self.keeps_velocity else (
             told == last).all(axis=0)                            # nothing new to the drive
+        if last is not None and self.late_ns:
+            self._before.append((self._told_ns, last, self._goes))
         self._goes = np.where(held, 0.0, told[1])
         self._told_ns, self._told = time_ns, told
 
@@ -119,6 +128,7 @@ class DriveWatch:
             return
         if told is None or not 0 < after_ns <= LONGEST_NS:
             self._means = np.zeros_like(self._means)
+            self._before.clear()
             return
         dt, q, q_dot = 1e-9 * after_ns, state.joint_position, state.joint_velocity
         position, velocity, effort = told
@@ -127,6 +137,8 @@ class DriveWatch:
         news, given, fade = self._news, state.joint_effort / self._limit, exp(-dt / MEMORY_S)
         news[0], news[1] = plain, plain + self._damping * self._goes
         asked = self._limited(news[:2], q_dot) / self._limit
+        if self.late_ns:
+            asked[:] = self._nearest(given, asked, state)
         news[:2], news[2], news[3] = asked, self._damping * q_dot / self._limit, given
         news[5:3:-1] = asked * asked
         news[6:8], news[8], news[9] = asked * given, given * given, q_dot * q_dot
@@ -144,6 +156,21 @@ class DriveWatch:
             return
         lately = now - self._failed_ns < WELL_NS
         self.failing = tuple(name for name, of in zip(self._names, lately, strict=True) if of)
+
+    def _nearest(self, given: Array, asked: Array, state: RobotState) -> Array:
+        """What is nearest to the torques that are given, (12,), between those that are asked for,
+        (2, 12), and those that older targets ask for.
+        """
+        while self._before and state.time_ns - self._before[0][0] > self.late_ns:
+            self._before.popleft()
+        if self._before:
+            told, goes = (np.array(rows) for rows in list(zip(*self._before, strict=True))[1:])
+            plain = (self._kp * (told[:, 0] - state.joint_position)
+                     + self._kd * (goes - state.joint_velocity) + told[:, 2])
+            older = np.concatenate([plain, plain + self._damping * goes])
+            asked = np.concatenate([
+                asked, self._limited(older, state.joint_velocity) / self._limit])
+        return np.asarray(np.clip(given, asked.min(axis=0), asked.max(axis=0)))
 
     def _watch_legs(self, now: int) -> None:
         """Judge whether a leg moves without any torque."""

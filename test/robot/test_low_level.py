@@ -10,6 +10,7 @@ import pytest
 pytest.importorskip('mujoco')
 
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.modes.motion_library import lying_posture
 from dmp_cpg_ros.core.robot_model.state import JointTargets
 from dmp_cpg_ros.robot.drive_watch import DriveWatch
@@ -20,6 +21,8 @@ from dmp_cpg_ros.robot.low_level import (
     MotorCommand,
 )
 from dmp_cpg_ros.robot.model_reader import load_description
+from dmp_cpg_ros.robot.watchdog import CARRIED_NS
+from dmp_cpg_ros.suite import load_suite
 
 DESCRIPTION = load_description()
 KP, KD = np.tile(DESCRIPTION.kp, 4), np.tile(DESCRIPTION.kd, 4)
@@ -138,3 +141,54 @@ def test_motors_that_go_on_with_a_velocity_are_judged_by_one_that_goes_on(
         robot.step()
     assert seen == fails
     assert watch._reports
+
+
+def watched(periods: int, late: int, at_once: int, late_ns: int, dead_from: int = -1
+            ) -> tuple[int, set[str]]:
+    """Walk on motors whose commands come some periods late, and now and then to several states
+    that came at once; returns when something was first said of the drives, and of which leg.
+    """
+    suite, robot, watch = load_suite(), LowLevelRobot(start_pose='standing'), DriveWatch(
+        DESCRIPTION)
+    watch.keeps_velocity, watch.late_ns = True, late_ns
+    loop, rng = WalkingLoop(DESCRIPTION, suite.gait, suite.parameters), np.random.default_rng(3)
+    on_their_way: list[tuple[int, dict[str, object]]] = []
+    targets, k = loop.tick(robot.state).targets, 0
+    while k < periods:
+        states = []
+        for _ in range(at_once if rng.random() < 0.3 else 1):
+            while on_their_way and on_their_way[0][0] <= k:
+                commanded(robot, **on_their_way.pop(0)[1])
+            if k == dead_from:
+                robot.robot.without_power = ('fr',)
+            robot.step()
+            states.append(robot.state)
+            k += 1
+        for state in states:
+            watch.see(state)
+            if watch.failing or watch.lame:
+                return k, {name[:2] for name in (*watch.failing, *watch.lame)}
+            if state.time_ns % suite.tick_ns == 0:
+                loop.command(0.4)
+                targets = loop.tick(state).targets
+            watch.tell(state.time_ns, targets)
+            on_their_way.append((k + late, {
+                'position': targets.position, 'velocity': targets.velocity,
+                'effort': targets.effort, 'kp': KP, 'kd': KD}))
+    return -1, set()
+
+
+@pytest.mark.parametrize(('late', 'at_once'), [(0, 1), (1, 1), (6, 1), (1, 5)])
+def test_motors_that_act_late_are_not_taken_for_ones_without_power(
+        late: int, at_once: int) -> None:
+    assert watched(1000, late, at_once, CARRIED_NS) == (-1, set())
+
+
+def test_one_who_does_not_know_that_they_do_takes_them_for_that() -> None:
+    assert watched(1000, 2, 1, 0)[0] > 0
+
+
+@pytest.mark.parametrize('late', [0, 6])
+def test_a_leg_without_power_is_found_among_motors_that_act_late(late: int) -> None:
+    when, legs = watched(1100, late, 1, CARRIED_NS, dead_from=1000)
+    assert legs == {'fr'} and 1000 < when <= 1050

@@ -61,6 +61,7 @@ class DrivenRobot(SuiteNode):
                                       if self.lossy else 0, self.return_ns)
         self._guard.drives.watches = self.has_drives
         self._guard.drives.keeps_velocity = self.keeps_velocity
+        self._guard.drives.late_ns = self.acts_late_ns
         self._guard.drives.cuts = self.cuts_power
 
     @property
@@ -72,6 +73,11 @@ class DrivenRobot(SuiteNode):
     def keeps_velocity(self) -> bool:
         """Whether the drives are told velocities at a rate of their own."""
         return False
+
+    @property
+    def acts_late_ns(self) -> int:
+        """Age of the oldest targets by which the drives may still act [ns]."""
+        return 0
 
     @property
     def cuts_power(self) -> bool:
