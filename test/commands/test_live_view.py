@@ -4,15 +4,12 @@
 
 from __future__ import annotations
 
-import http.client
 import json
 import os
 import signal
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import pytest
@@ -33,33 +30,25 @@ from ros_processes import (
     wait_until,
 )
 
+from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
+from dmp_cpg_ros.studies.first_walk import ADDRESS, ViewClient
 from dmp_cpg_ros.suite_table import ROBOT, WALKING_NODES
 
 shared_domain, suite, ros = (
     ros_processes.shared_domain, ros_processes.shared_suite, ros_processes.shared_ros)
 
-ADDRESS = r'live view: (http://127\.0\.0\.1:\d+/\?token=\S+)'
-
 PATIENCE_S = 90.0
 
 
-class Client:
-    """A browser without a picture."""
+class Client(ViewClient):
+    """A browser without a picture, of a process that serves the page."""
 
     def __init__(self, process: NodeProcess) -> None:
         self.process = process
-        self.address = process.wait_for_output(ADDRESS, PATIENCE_S)[1]
-        url = urlsplit(self.address)
-        self._port, (token,) = url.port, parse_qs(url.query)['token']
-        self._headers = {'Authorization': f'Bearer {token}'}
-
-    def ask(self, path: str, body: str | None = None) -> http.client.HTTPResponse:
-        connection = http.client.HTTPConnection('127.0.0.1', self._port, timeout=PATIENCE_S)
-        connection.request('GET' if body is None else 'POST', path, body, self._headers)
-        return connection.getresponse()
+        super().__init__(process.wait_for_output(ADDRESS, PATIENCE_S)[1], PATIENCE_S)
 
     def scene(self) -> Any:
         """What is drawn, once the suite is there."""
@@ -74,13 +63,6 @@ class Client:
 
         wait_until(drawn, PATIENCE_S, what=lambda: f'the scene of {self.process}')
         return found[0]
-
-    def send(self, **command: Any) -> tuple[bool, str]:
-        """A command's answer."""
-        answer = self.ask('/command', json.dumps(command))
-        text = answer.read().decode()
-        assert answer.status == 200, text
-        return tuple(json.loads(text).values())
 
     def granted(self, **command: Any) -> str:
         """Answer to a command that is taken, by a robot that looks after itself a moment later."""
@@ -100,16 +82,6 @@ class Client:
         self.until(lambda frame: self.send(velocity=[0.3, 0, 0])[0] and not frame['requested']
                    and frame['stop']['state'] == 'walking')
 
-    def frames(self) -> Iterator[Any]:
-        """Frames as they come; lines without one keep the connection alive."""
-        stream = self.ask('/frames')
-        assert stream.status == 200
-        end = time.monotonic() + PATIENCE_S
-        while line := stream.readline():
-            if line.strip():
-                yield json.loads(line)
-            assert time.monotonic() < end, f'{PATIENCE_S} s of frames of {self.process}'
-
     def until(self, condition: Callable[[Any], object]) -> Any:
         """First frame of which a condition holds."""
         frame = None
@@ -117,7 +89,7 @@ class Client:
             for frame in self.frames():
                 if condition(frame):
                     return frame
-        except AssertionError as error:
+        except DmpCpgError as error:
             raise AssertionError(f'{error}, the last of which: {frame}') from error
         raise AssertionError(self.process)
 
