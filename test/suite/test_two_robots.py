@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+import json
+import os
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+import yaml
 
 pytest.importorskip('rclpy')
 
@@ -46,6 +49,24 @@ events:
 """What two robots do, each something else, with requests at other times."""
 
 
+A_MINUTE = pytest.param(7, marks=pytest.mark.skipif(
+    'LONG_WALKS' not in os.environ, reason='takes minutes: make test-extras'), id='a minute')
+"""As often in turn they do it in a minute."""
+
+
+PAUSE_S = 2.0
+"""After one time, for what it has begun [s]."""
+
+
+def repeated(text: str, times: int) -> str:
+    """A scenario that is done several times, one after the other."""
+    scenario = yaml.safe_load(text)
+    every, events = scenario['duration'] + PAUSE_S, scenario['events']
+    return json.dumps(scenario | {'duration': times * every - PAUSE_S, 'events': [
+        event | {'at': round(event['at'] + number * every, 3)}
+        for number in range(times) for event in events]})
+
+
 def digests(folder: Path, domains: dict[str, int]) -> dict[str, dict[str, str]]:
     """Let both walk at the same time; returns what each has published."""
     started = {name: Processes(domain) for name, domain in domains.items()}
@@ -67,9 +88,10 @@ def digests(folder: Path, domains: dict[str, int]) -> dict[str, dict[str, str]]:
             for name, domain in domains.items()}
 
 
-def test_two_robots_in_one_domain_walk_as_each_does_alone(tmp_path: Path) -> None:
+@pytest.mark.parametrize('times', [1, A_MINUTE])
+def test_two_robots_in_one_domain_walk_as_each_does_alone(tmp_path: Path, times: int) -> None:
     for name, text in WALKS.items():
-        (tmp_path / f'{name}.yaml').write_text(text, encoding='utf-8')
+        (tmp_path / f'{name}.yaml').write_text(repeated(text, times), encoding='utf-8')
     with ExitStack() as stack:
         one, other, both = (stack.enter_context(reserved_domain()) for _ in range(3))
         alone = digests(tmp_path, {'robot1': one, 'robot2': other})
