@@ -63,6 +63,10 @@ STAGES = {'address_s': 'address printed', 'picture_s': 'robot shown', 'walks_s':
 """What is measured, and how a table calls it."""
 
 
+WAITED = ('address_s', 'picture_s', 'walks_s')
+"""Those of them that are counted from the command on."""
+
+
 class ViewClient:
     """A browser without a picture.
 
@@ -261,11 +265,14 @@ def as_promised(result: dict[str, Any]) -> bool:
 
 
 def table(results: Sequence[dict[str, Any]]) -> str:
-    """Rows of the rounds [s]."""
-    return markdown_table(['way', 'round', *(f'{words} [s]' for words in STAGES.values())], [
-        [one['way'], str(one['round']), *(f'{one[name]:.1f}' if name in (
-            'address_s', 'picture_s', 'walks_s') else f'{one[name]:.3f}' for name in STAGES)]
-        for one in results])
+    """What was measured, as Markdown [s]."""
+    return markdown_table(['way', 'round', *STAGES.values()], list(map(cells, results)))
+
+
+def cells(result: dict[str, Any]) -> list[str]:
+    """A row of the table: a person's waiting to a tenth of a second, the robot's times exactly."""
+    return [result['way'], str(result['round']), *(
+        f'{result[name]:.{1 if name in WAITED else 3}f} s' for name in STAGES)]
 
 
 if __name__ == '__main__':

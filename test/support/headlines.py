@@ -20,6 +20,7 @@ import headlines_of_bodies as bodies
 import headlines_of_faults as faults
 from checkout import ROOT
 
+from dmp_cpg_ros.studies import first_walk
 from dmp_cpg_ros.studies.random_stops import ROUGHNESS
 from dmp_cpg_ros.studies.study_stops import table
 from dmp_cpg_ros.studies.walking_trials import relative_error
@@ -389,6 +390,12 @@ def rate_rows(runs: Any) -> list[str]:
             f'{benchmarked("busy"):.2f} beside a busy loop']
 
 
+def first_rows(results: Any) -> list[str]:
+    """Rows of ``first_walk``."""
+    assert all(map(first_walk.as_promised, results)), results
+    return [f'| {" | ".join(first_walk.cells(one))} |' for one in results]
+
+
 TIGHTNESS = {
     'synchronisation': 'synchronisation', 'capture': 'capture',
     'contraction under inhibition, along tubes': 'contraction along tubes',
@@ -469,6 +476,8 @@ STUDIES = {
     'other-robots': Study(bodies.robots, bodies.robot_rows),
     'beside-a-learned-policy': Study(bodies.duel, bodies.duel_rows, 'doc/walking.md'),
     'rate': Study(rate, rate_rows),
+    'from-one-line-to-a-walking-robot': Study(
+        None, first_rows, 'doc/performance.md', 'first-walk'),
     'hostile-neighbours': Study(faults.hostile, faults.hostile_rows, 'doc/faults.md'),
     'killed-nodes': Study(None, faults.kill_rows, 'doc/faults.md')}
 """Studies that have a file, ``doc/results/ANCHOR.json``, by the anchor of their section; that of
