@@ -20,6 +20,7 @@ from dmp_cpg_ros.commands.ending_signals import InterruptedRunError
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.nodes.framework import health
+from dmp_cpg_ros.nodes.framework.execution import spin_in_slices
 from dmp_cpg_ros.nodes.messages.interfaces import private
 from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
@@ -118,9 +119,7 @@ class SuiteWatch:
         """Spin until a future is done; returns whether it is. Ctrl-C cuts it short, but not while
         the suite is brought to its end.
         """
-        deadline = time.monotonic() + patience_s
-        while not future.done() and time.monotonic() < deadline:
-            self._executor.spin_until_future_complete(future, timeout_sec=SLICE_S)
+        for _ in spin_in_slices(self._executor, future, SLICE_S, patience_s):
             if self._interrupted and not self._ending:
                 raise InterruptedRunError(self._interrupted[0])
             self._look_after_processes()

@@ -46,7 +46,7 @@ from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.nodes.framework import execution
-from dmp_cpg_ros.nodes.framework.execution import make_executor, spin
+from dmp_cpg_ros.nodes.framework.execution import make_executor, spin, spin_in_slices
 from dmp_cpg_ros.nodes.framework.health import LOG_EVERY_S, NodeHealth
 from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery
 from dmp_cpg_ros.nodes.framework.parameters import (
@@ -709,6 +709,23 @@ def test_without_events_executor_the_single_threaded_one_serves(
     assert isinstance(make_executor('events', ros.context), SingleThreadedExecutor)
     monkeypatch.delattr(rclpy.experimental, 'EventsExecutor')
     assert isinstance(make_executor('events', ros.context), SingleThreadedExecutor)
+
+
+@pytest.mark.parametrize('kind', ['events', 'single'])
+def test_who_waits_for_long_gathers_nothing(ros: Ros, kind: str) -> None:
+    class Counted(Future):
+        callbacks = 0
+
+        def add_done_callback(self, callback: Any) -> None:
+            self.callbacks += 1
+            super().add_done_callback(callback)
+
+    executor, awaited, slices = make_executor(kind, ros.context), Counted(), 0
+    for slices, _ in enumerate(spin_in_slices(executor, awaited, 0.001, 60.0), start=1):
+        if slices == 50:  # within the slice after this one
+            executor.create_task(awaited.set_result, True)
+    assert slices == 51 and awaited.callbacks == 1
+    assert list(spin_in_slices(executor, Future(), 0.001, 0.0)) == []
 
 
 @pytest.mark.parametrize(('executor', 'number'), [

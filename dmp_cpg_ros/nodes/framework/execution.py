@@ -216,6 +216,32 @@ def make_executor(kind: str, context: Context | None = None) -> Executor:
     return SingleThreadedExecutor(context=context)
 
 
+def spin_in_slices(executor: Executor, future: Future, slice_s: float, within_s: float
+                   ) -> Iterator[None]:
+    """Spin until a future is done, and yield now and then to who waits for it.
+
+    The events executor leaves a callback of its own, some 400 bytes, with every future that it
+    has spun for: each slice has a future that is forgotten with it.
+
+    Parameters
+    ----------
+    executor : Executor
+        Spins, at least once if the future is not done.
+    future : Future
+        What is waited for.
+    slice_s : float
+        Time of the wall clock between two yields at most [s].
+    within_s : float
+        How long to wait in all [s].
+    """
+    deadline, ended = time.monotonic() + within_s, [Future()]
+    future.add_done_callback(lambda _: ended[0].set_result(None))
+    while not future.done() and time.monotonic() < deadline:
+        ended[0] = Future()
+        executor.spin_until_future_complete(ended[0], timeout_sec=slice_s)
+        yield
+
+
 def spin(nodes: Sequence[Node], kind: str, until: Future) -> None:
     """Run nodes of one context in one executor until it is shut down or a future is done.
 
