@@ -13,7 +13,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.nodes.framework.writer_watch import (
+    FASTEST,
     LOST,
+    MADE_UP_NS,
     PROVEN,
     REMEMBERED_NS,
     SILENT_NS,
@@ -50,6 +52,40 @@ def test_messages_that_were_sent_again_may_be_received_late() -> None:
     for k in range(KNOWN + 1, KNOWN + 100):
         late = 100 * TICK_NS if k == KNOWN + 1 else 0
         assert watch.admits(k, k * TICK_NS, k * TICK_NS + late)
+
+
+@given(st.lists(st.tuples(st.integers(30, 500), st.integers(0, 5), st.integers(0, 480)),
+                min_size=1, max_size=6), st.booleans())
+def test_after_a_stall_what_the_queue_has_kept_is_heard(
+        stalls: list[tuple[int, int, int]], flooded: bool) -> None:
+    """All that was sent in a stall is received at once; some is taken, then the queue overflows.
+    A stranger's old messages come in between all the time.
+    """
+    watch, tick, flood = watched(alone=False), KNOWN, 0
+    for length, taken, lost in stalls:
+        end_ns = (tick + length) * TICK_NS
+        for k in range(1, length + 300):
+            if taken < k <= min(taken + lost, length):
+                continue
+            number = tick + k
+            now_ns = max(end_ns, number * TICK_NS) + k * 1000
+            for _ in range(2 * flooded):
+                flood += 1
+                assert not watch.may_admit(flood, TICK_NS, now_ns) or not watch.admits(
+                    flood, TICK_NS, now_ns)
+            assert watch.admits(number, number * TICK_NS, now_ns)
+        tick = number
+
+
+def test_a_stall_is_no_licence_for_later() -> None:
+    """Once messages come in time again, no more robot's time is made up than without a stall."""
+    watch, stall = watched(), 400
+    for k in range(1, 251):
+        assert watch.admits(KNOWN + k, (KNOWN + k) * TICK_NS, (KNOWN + stall + k) * TICK_NS)
+    number, now = KNOWN + 251, (KNOWN + stall + 251) * TICK_NS
+    most = (KNOWN + 250) * TICK_NS + FASTEST * TICK_NS + MADE_UP_NS
+    assert not watch.may_admit(number, most + 1, now)
+    assert watch.may_admit(number, most, now)
 
 
 def test_ticks_may_be_lost_while_their_length_is_learned() -> None:

@@ -35,6 +35,11 @@ MADE_UP_NS, FASTEST = 500_000_000, 4
 faster than the clock a robot's time may go.
 """
 
+STALL_NS, MOST_OWED_NS = 100_000_000, 2_000_000_000
+"""In real time: time without a message from which on what was sent meanwhile may come at once
+[ns], and of how much robot's time that may be at most [ns].
+"""
+
 PROVEN = 5
 """Messages in a row, of nobody else, from which one of several publishers is the writer."""
 
@@ -59,8 +64,8 @@ class WriterWatch:
     """
 
     __slots__ = ('_heard_ns', '_last', '_learned', '_lock_step', '_may_take_over', '_most_lost',
-                 '_stamp_ns', '_repeats', '_stranger', '_stranger_ns', '_tick_ns', '_ticked',
-                 '_tried')
+                 '_owed_ns', '_repeats', '_stamp_ns', '_stranger', '_stranger_ns', '_tick_ns',
+                 '_ticked', '_tried')
 
     def __init__(self, may_take_over: Callable[[], bool | None], *, ticked: bool = True,
                  lock_step: bool = False, most_lost: float = LOST) -> None:
@@ -72,7 +77,7 @@ class WriterWatch:
 
     def _begin(self, number: int, stamp_ns: int, now_ns: int) -> None:
         self._last, self._stamp_ns, self._heard_ns = number, stamp_ns, now_ns
-        self._tick_ns, self._learned, self._repeats = 0, 0, 0
+        self._tick_ns, self._learned, self._repeats, self._owed_ns = 0, 0, 0, 0
         self._tried = (0, 0, 0)
 
     def admits(self, number: int | None, stamp_ns: int, now_ns: int) -> bool:
@@ -116,6 +121,10 @@ class WriterWatch:
             own_ns = passed_ns // max(1, ahead - self._repeats)
             self._tick_ns = min(self._tick_ns or own_ns, own_ns)
         self._repeats = 0
+        gap_ns = max(0, now_ns - self._heard_ns)
+        if self._owed_ns or gap_ns > STALL_NS:  # what comes in time again owes nothing
+            more_ns = gap_ns if gap_ns > STALL_NS else -gap_ns
+            self._owed_ns = min(max(0, self._owed_ns - passed_ns + more_ns), MOST_OWED_NS)
         self._last, self._stamp_ns = number, stamp_ns
         # What is sent again after a loss is received later than what waited behind it.
         self._heard_ns = max(self._heard_ns, now_ns)
@@ -186,6 +195,8 @@ class WriterWatch:
             return ahead <= self._repeats + 1 and passed_ns == self._tick_ns
         # A clock that is set back must not make the writer a stranger.
         # Ticks may all have been lost between those from which their length was learned.
+        # What was held up by a stall of this process, or of the writer, comes at once, without
+        # what its queue had no room for: messages that follow each other then may be far apart.
         shorter = ahead == 1 and not self.has_strangers(now_ns)
         return (SHORTEST_TICK_NS if shorter else ahead * self._tick_ns) <= passed_ns <= (
-            FASTEST * max(0, now_ns - self._heard_ns) + MADE_UP_NS)
+            FASTEST * max(0, now_ns - self._heard_ns) + MADE_UP_NS + self._owed_ns)
