@@ -140,11 +140,12 @@ class ConnectedNode(GuardedLifecycleNode):
                 self._late.append(partial(inside.catch_up, topic.name, guarded))
             return None
         receive: Callable[..., None] = take
-        informed = command or not raw and expected_count(topic.publishers) > 0
+        informed = command or expected_count(topic.publishers) > 0
         if command:
             receive = self._commands.counted(topic.name, take)
         elif informed:
-            receive = self.writers.only(topic, callback, read)
+            receive = self.writers.all_of(topic, take) if raw else (
+                self.writers.only(topic, callback, read))
         usual = topic.lossy_qos if self.lossy else topic.reader_qos
         subscription = self.create_subscription(
             topic.type, topic.name, receive, qos or usual, raw=True)

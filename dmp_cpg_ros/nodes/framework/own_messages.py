@@ -20,6 +20,8 @@ from rclpy.node import Node
 from rclpy.subscription import Subscription
 
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.nodes.framework.floods import Floods
+from dmp_cpg_ros.nodes.framework.strangers import UNNAMED
 from dmp_cpg_ros.nodes.framework.writer_watch import WriterWatch
 from dmp_cpg_ros.nodes.framework.writers import (
     LOOK_EVERY_S,
@@ -31,9 +33,6 @@ from dmp_cpg_ros.nodes.framework.writers import (
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader, serialized_stamp
 from dmp_cpg_ros.nodes.messages.interfaces import READER_DEPTH, Interface
 from dmp_cpg_ros.suite_table import KINDS
-
-UNNAMED = '_NODE_NAME_UNKNOWN_'
-"""What the graph calls a node of which it has heard no name yet."""
 
 
 class OwnMessages:
@@ -56,6 +55,7 @@ class OwnMessages:
         """Read nothing yet."""
         self._node, self._tell, self._lock_step = node, tell, lock_step
         self._publishers = Publishers(node)
+        self._floods = Floods(self._publishers, lambda topic, text: None)  # named they are anyhow
         self._watches: list[tuple[Interface, WriterWatch]] = []
         self._told: dict[str, str] = {}
         self._looked: dict[str, float] = {}
@@ -74,11 +74,11 @@ class OwnMessages:
             with suppress(DataError):
                 stamp_ns = serialized_stamp(data) if ticked else 0
                 if not watch.may_admit(number, stamp_ns, now_ns):
-                    self._name(topic, only_taken)
+                    self._refuse(topic, now_ns)
                     return
                 message = read(data)  # only what can be read makes its sender the writer
                 if not watch.admits(number, stamp_ns, now_ns):
-                    self._name(topic, only_taken)
+                    self._refuse(topic, now_ns)
                     return
                 if not watch.known:
                     self._name(topic, _all_taken)
@@ -102,7 +102,7 @@ class OwnMessages:
             _, number, now_ns = with_number(None, information)
             own = watch.admits(number, stamp_ns, now_ns)
             if not own:
-                self._name(topic, only_taken)
+                self._refuse(topic, now_ns)
             return own
 
         return admits
@@ -118,6 +118,10 @@ class OwnMessages:
     def _watched(self, watch: WriterWatch, topic: Interface) -> WriterWatch:
         self._watches.append((topic, watch))
         return watch
+
+    def _refuse(self, topic: Interface, now_ns: int) -> None:
+        self._floods.note(topic, now_ns)
+        self._name(topic, only_taken)
 
     def _name(self, topic: Interface, sentence: Callable[[Interface, str], str]) -> None:
         """Tell who else publishes a topic; nobody does where a writer was only started again."""

@@ -27,6 +27,15 @@ OWN = frozenset(name for kind in KINDS.values() for name in kind.instances)
 """Names of the suite's nodes."""
 
 
+UNNAMED = '_NODE_NAME_UNKNOWN_'
+"""What the graph calls a node of which it has heard no name yet, or that has none."""
+
+
+def full_name(name: str, space: str) -> str:
+    """Name of a node with its namespace."""
+    return f'{space.rstrip("/")}/{name}'
+
+
 class Strangers:
     """Names of nodes that are not the suite's, looked up in the graph of one of its nodes.
 
@@ -75,7 +84,7 @@ class Strangers:
         """Full name of a node, empty if it is the suite's own."""
         own = (name in OWN or name == self._node.get_name()) and (
             space == self._node.get_namespace())
-        return '' if own else f'{space.rstrip("/")}/{name}'
+        return '' if own else full_name(name, space)
 
     def _told(self, key: str, verb: str, names: Callable[[], Iterable[str]]) -> str:
         now_s, (then_s, text) = time.monotonic(), self._known.get(key, (-inf, ''))

@@ -15,9 +15,13 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 from rosgraph_msgs.msg import Clock
 
+from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.nodes.framework.floods import Floods
+from dmp_cpg_ros.nodes.framework.strangers import full_name
 from dmp_cpg_ros.nodes.framework.writer_watch import WriterWatch
 from dmp_cpg_ros.nodes.messages.cdr import serialized_stamp
 from dmp_cpg_ros.nodes.messages.interfaces import SHARED, Interface, expected_count
@@ -51,8 +55,8 @@ class Publishers:
         self._looked: dict[str, tuple[float, bool | None]] = {}
         self._own: set[str] = set()
 
-    def found(self, topic: Interface) -> tuple[bool, list[str]]:
-        """Whether the suite's own node publishes a topic, and names of those that should not.
+    def ends(self, topic: Interface) -> tuple[list[TopicEndpointInfo], list[TopicEndpointInfo]]:
+        """Publishers of a topic that are of the suite's own nodes, and those that should not be.
 
         A driver of another name may stand for the suite's node where that has not been there.
         """
@@ -60,14 +64,17 @@ class Publishers:
         ends = node.get_publishers_info_by_topic(node.resolve_topic_name(topic.name))
         space, names = node.get_namespace(), {
             name for kind in topic.publishers if kind in KINDS for name in KINDS[kind].instances}
-        own = {end.node_name for end in ends
-               if end.node_name in names and end.node_namespace == space}
-        others = {f'{end.node_namespace.rstrip("/")}/{end.node_name}' for end in ends
-                  if end.node_name not in own or end.node_namespace != space}
+        own = [end for end in ends if end.node_name in names and end.node_namespace == space]
+        others = [end for end in ends if end not in own]
         if own and not others:
             self._own.add(topic.name)
         few = len(ends) <= expected_count(topic.publishers)
-        return bool(own), [] if few and topic.name not in self._own else sorted(others)
+        return own, [] if few and topic.name not in self._own else others
+
+    def found(self, topic: Interface) -> tuple[bool, list[str]]:
+        """Whether the suite's own node publishes a topic, and names of those that should not."""
+        own, others = self.ends(topic)
+        return bool(own), sorted({full_name(end.node_name, end.node_namespace) for end in others})
 
     def may_take_over(self, topic: Interface) -> bool | None:
         """For a :class:`WriterWatch`."""
@@ -115,12 +122,14 @@ class TopicWriters:
         """Know no topic yet."""
         self._node = node
         self._publishers = Publishers(node)
+        self._floods = Floods(self._publishers, self._tell_flood)
         self._watches: dict[str, list[WriterWatch]] = {}
         self._several: dict[str, float] = {}
 
     def forget(self) -> None:
         """Forget the writers that were read, with the readers."""
         self._watches = {}
+        self._floods.forget()
 
     def only(self, topic: Interface, callback: Callable[[Any], None],
              read: Callable[[bytes], Any]) -> Callable[..., None]:
@@ -154,18 +163,32 @@ class TopicWriters:
             if not (node.active or (latched and node.configured)):
                 return
             data, number, now_ns = with_number(data, information)
-            stamp_ns = serialized_stamp(data) if ticked else 0
-            if not any(watch.may_admit(number, stamp_ns, now_ns) for watch in watches):
-                self._refuse(topic)
-                return
-            if ticked and not lock_step and time.time_ns() > now_ns + STALE_NS:
-                return
-            message = read(data)  # only what can be read makes its sender the writer
-            watch = alone or by_leg.get(node.leg_of((message.name or ('',))[0]))
-            if watch is None or watch.admits(number, stamp_ns, now_ns):  # no leg: it is refused
-                callback(message)
-            else:
-                self._refuse(topic)
+            try:
+                stamp_ns = serialized_stamp(data) if ticked else 0
+                if not any(watch.may_admit(number, stamp_ns, now_ns) for watch in watches):
+                    self._refuse(topic, now_ns)
+                    return
+                if ticked and not lock_step and time.time_ns() > now_ns + STALE_NS:
+                    return
+                message = read(data)  # only what can be read makes its sender the writer
+                watch = alone or by_leg.get(node.leg_of((message.name or ('',))[0]))
+                if watch is None or watch.admits(number, stamp_ns, now_ns):  # no leg: is refused
+                    callback(message)
+                else:
+                    self._refuse(topic, now_ns)
+            except DataError:
+                self._floods.note(topic, now_ns)
+                raise
+
+        return receive
+
+    def all_of(self, topic: Interface, callback: Callable[[bytes], None]) -> Callable[..., None]:
+        """Return a callback that takes everybody's bytes on a topic, until somebody floods it."""
+        def receive(data: Any, information: Any = None) -> None:
+            data, _, now_ns = with_number(data, information)
+            if topic.name not in SHARED:
+                self._floods.note(topic, now_ns, of_all=True)
+            callback(data)
 
         return receive
 
@@ -202,6 +225,7 @@ class TopicWriters:
                 self._name_strangers(topic)
             else:
                 node.clear(f'writer of {topic.name}')
+            self._floods.look(topic)
         for name, then_s in self._several.items():
             if now_s < then_s + SEVERAL_S:
                 ends = node.get_publishers_info_by_topic(node.resolve_topic_name(name))
@@ -210,12 +234,20 @@ class TopicWriters:
             else:
                 node.clear(f'writers of {name}')
 
-    def _refuse(self, topic: Interface) -> None:
+    def _refuse(self, topic: Interface, now_ns: int) -> None:
         """Count a message of a stranger, and say who it is."""
+        self._floods.note(topic, now_ns)
         health, key = self._node.health, f'writer of {topic.name}'
         health.rejected[topic.name] = health.rejected.get(topic.name, 0) + 1
         if not health.has_problem(key):
             self._name_strangers(topic)
+
+    def _tell_flood(self, topic: Interface, text: str) -> None:
+        key = f'flood of {topic.name}'
+        if text:
+            self._node.warn(key, text)
+        else:
+            self._node.clear(key)
 
     def _name_strangers(self, topic: Interface) -> None:
         who = ', '.join(self._publishers.found(topic)[1]) or 'another node of the same name'
