@@ -33,6 +33,7 @@ from dmp_cpg_ros.nodes.framework.judging import Later
 from dmp_cpg_ros.nodes.framework.known_stop import OthersKnow
 from dmp_cpg_ros.nodes.framework.promise import Present, Promises
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.framework.waiting_requests import OVERTAKEN, WaitingRequests
 from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader, GaitMemoryWriter
 from dmp_cpg_ros.nodes.messages.commands import read_votes
 from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsWriter, inhibition_state
@@ -51,15 +52,8 @@ HEARTBEAT_NS = 100_000_000
 JOIN_EVERY_S = 0.1
 """In lock-step, how often a restarted node looks whether it has been told what acts [s]."""
 
-OVERTAKEN = 'done; another request came before it was predicted'
-"""Answer to a request that was no longer in force when it had been predicted."""
-
-PATIENCE_NS = 5_000_000_000
-"""How long a start waits for a robot that stands by itself [ns]."""
-
 UNKNOWN = 'done; it could not be predicted'
 """Begin of the answer to a request of which no time can be said."""
-
 
 
 class InhibitionNode(SuiteNode):
@@ -86,8 +80,7 @@ class InhibitionNode(SuiteNode):
         self._x_dot: Any = None
         self._r, self._body_mode = np.zeros(3), 'standing'
         self._promises, self._anew = Promises(self, self.certified, self._network.gait), False
-        self._answer: tuple[bool, Later] | None = None
-        self._put_off: tuple[Later, int] | None = None
+        self._waiting = WaitingRequests()
         self._told_ns, self._blind = -HEARTBEAT_NS, ''
         self._drive, self._joined, self._asked = FOLLOWING, False, False
         self._began_ns = -1
@@ -120,6 +113,11 @@ class InhibitionNode(SuiteNode):
         }, delayed={} if self.lock_step else mode, optional=sensors, last='posture_feedback')
         self._gate = self.certified.commands()
         self.serve('inhibit', self._take_request)
+
+    def deactivate(self) -> None:
+        """Answer the start that waits: nothing will be started."""
+        self._waiting.refuse(f'{self.get_name()} was deactivated before the robot followed its '
+                             'legs')
 
     def on_parameters(self) -> None:
         """Take over what may change while walking."""
@@ -269,8 +267,8 @@ class InhibitionNode(SuiteNode):
 
     def _watch(self, now_ns: int) -> None:
         """Notice on the robot's clock that nothing is known of the gait any more."""
-        if self._put_off is not None and now_ns > self._put_off[1]:
-            self._answer_put_off(self._refusal)
+        if self._waiting.is_overdue(now_ns):
+            self._waiting.refuse(self._refusal)
         if not self._joined:
             return
         if now_ns - self._state.time_ns > BLIND_NS and not self._blind:
@@ -319,12 +317,11 @@ class InhibitionNode(SuiteNode):
         self.take_parameters()  # with which the tick begins in which the request acts
         if self._x is None:
             return False, 'no canonical_state and reference yet; is canonical_oscillators running?'
-        self._answer_put_off((False, 'another request came before the robot followed its legs'))
+        self._waiting.refuse('another request came before the robot followed its legs')
         if not stop and self._stands_by_itself and not self.lock_step:
-            self._put_off = answer, self.health.stamp_ns + PATIENCE_NS
-            return answer
+            return self._waiting.put_off(answer, self.health.stamp_ns)
         if not stop and self._barring != 'standing':
-            return self._refusal
+            return False, self._refusal
         if self._blind:
             if stop:
                 self._state = self._supervisor.request(self._state, True)
@@ -345,9 +342,7 @@ class InhibitionNode(SuiteNode):
         if not self.lock_step:  # what it takes to predict must not delay it
             self._acting = self._supervisor.inhibition(self._state)
             self._publish_gains()
-        if self._answer is not None:
-            self._answer[1].deliver((True, OVERTAKEN))
-        self._answer = stop, answer
+        self._waiting.acts(stop, answer)
         self._predict()
         return answer.delivered or answer
 
@@ -359,26 +354,20 @@ class InhibitionNode(SuiteNode):
         return self._drive == 'stand' and self._body_mode == 'standing'
 
     @property
-    def _refusal(self) -> tuple[bool, str]:
+    def _refusal(self) -> str:
         """Why the gait cannot start."""
         way = ('ask again when it follows its legs' if self._stands_by_itself else
                f'call {"recover" if self._barring == "damped" else "stand_up"}, or wait until it '
                'stands')
-        return False, f'the gait cannot start: the robot is {self._barring}, not standing; {way}'
+        return f'the gait cannot start: the robot is {self._barring}, not standing; {way}'
 
     def _take_put_off(self) -> None:
         """Take the start that waits for the robot, or refuse it, once that does something else."""
-        if self._put_off is None or self._stands_by_itself:
-            return
-        (answer, _), self._put_off = self._put_off, None
-        known = self._take(False, answer)
-        if known is not answer:
-            answer.deliver(known)
-
-    def _answer_put_off(self, answer: tuple[bool, str]) -> None:
-        if self._put_off is not None:
-            (later, _), self._put_off = self._put_off, None
-            later.deliver(answer)
+        answer = None if self._stands_by_itself else self._waiting.resumed()
+        if answer is not None:
+            known = self._take(False, answer)
+            if known is not answer:
+                answer.deliver(known)
 
     def _told_of(self, stop: bool) -> tuple[bool, str]:
         """What a request is answered once it has been predicted."""
@@ -396,10 +385,8 @@ class InhibitionNode(SuiteNode):
         tick_ns = self.parameters_of(TickParameters).tick_ns
 
         def known(error: Exception | None) -> None:
-            if self._answer is not None:
-                (stop, answer), self._answer = self._answer, None
-                answer.deliver(
-                    self._told_of(stop) if error is None else (True, f'{UNKNOWN}: {error}'))
+            self._waiting.predicted(self._told_of if error is None else (
+                lambda _: (True, f'{UNKNOWN}: {error}')))
             if self.active and not self.lock_step and self._news() != self._told:
                 self._publish()
 

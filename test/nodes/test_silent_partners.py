@@ -26,7 +26,8 @@ from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework import gait_memory
 from dmp_cpg_ros.nodes.framework.judging import Later
 from dmp_cpg_ros.nodes.framework.known_stop import BRIEF_NS, PATIENT_NS
-from dmp_cpg_ros.nodes.inhibition import HEARTBEAT_NS, PATIENCE_NS, InhibitionNode
+from dmp_cpg_ros.nodes.framework.waiting_requests import PATIENCE_NS
+from dmp_cpg_ros.nodes.inhibition import HEARTBEAT_NS, InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.canonical_state import GaitMemoryWriter
 from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader, read_state_word
@@ -308,7 +309,8 @@ def test_the_gait_stops_while_the_robot_looks_after_itself(ros: Ros) -> None:
 @pytest.mark.parametrize('then, words', [
     ('following', 'walking in'), ('damp', 'is damped, not standing; call recover'),
     ('stand', 'looking after itself (stand), not standing; ask again when it follows its legs'),
-    ('inhibit', 'another request came before the robot followed its legs')])
+    ('inhibit', 'another request came before the robot followed its legs'),
+    ('deactivate', 'inhibition was deactivated before the robot followed its legs')])
 def test_a_start_waits_for_a_robot_that_stands_by_itself(
         ros: Ros, then: str, words: str) -> None:
     node, now = watching(ros, KNOWN)
@@ -320,6 +322,8 @@ def test_a_start_waits_for_a_robot_that_stands_by_itself(
     assert node._state.requested and not sent
     if then == 'inhibit':
         node._take_request(SetBool.Request(data=True))
+    elif then == 'deactivate':
+        node.trigger_deactivate()
     else:
         node._on_drive(String(data=then))
     if then == 'stand':
