@@ -85,13 +85,13 @@ class BodyState:
         self._estimator: BodyEstimator | None = None
         self.optional: tuple[str, ...] = ()
         self.readers: dict[str, Callable[[Any], Any]] = {
-            'joint_states': robot_state.JointsReader(description.joint_names).read}
+            'joint_states': stamped(robot_state.JointsReader(description.joint_names).read)}
         if node.parameters_of(StateSourceParameters).state_source != ESTIMATE:
             self.readers['ground_truth'] = robot_state.read_odom
             return
         self.optional = BODY_TOPICS[ESTIMATE]
-        self.readers |= {'joint_states': robot_state.JointsReader(
-                             description.joint_names, strict=False).read,
+        self.readers |= {'joint_states': stamped(robot_state.JointsReader(
+                             description.joint_names, strict=False).read),
                          'imu': stamped(robot_state.read_imu),
                          'foot_contacts': stamped(robot_state.FootContactsReader().read)}
         self._estimator = BodyEstimator(
@@ -128,7 +128,7 @@ class BodyState:
             By topic, what its reader returned.
         """
         if self._estimator is None:
-            position, velocity, effort = values['joint_states']
+            _, (position, velocity, effort) = values['joint_states']
             base: robot_state.BaseMotion = values['ground_truth']
             return RobotState(stamp_ns, position, velocity, effort, *base, np.zeros(3),
                               np.zeros(len(LEGS)))
@@ -191,12 +191,15 @@ class BodyState:
 
 
 def sensor_readings(stamp_ns: int, values: Mapping[str, Any]) -> SensorReadings:
-    """Readings of one tick; what bears another stamp is missing (NaN)."""
-    position, velocity, effort = values['joint_states']
+    """Readings of one tick; what bears another stamp is missing (NaN), but joints, whose stamp is
+    told.
+    """
+    joints_ns, (position, velocity, effort) = values['joint_states']
     nothing, no_contacts = np.full(3, np.nan), np.full(len(LEGS), np.nan)
     rate, force = told_at(stamp_ns, values['imu'], (nothing, nothing))
     contacts = told_at(stamp_ns, values['foot_contacts'], no_contacts)
-    return SensorReadings(stamp_ns, position, velocity, effort, rate, force, contacts)
+    return SensorReadings(
+        stamp_ns, position, velocity, effort, rate, force, contacts, joints_ns)
 
 
 class PostureControl(SuiteNode):

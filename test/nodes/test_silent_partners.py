@@ -564,13 +564,13 @@ def test_a_posture_control_that_comes_back_begins_with_the_readings_of_one_tick(
     for k, (imu_ns, published) in enumerate([(-TICK, 0), (-TICK, 0), (0, 1), (-TICK, 2)]):
         stamp = state.time_ns + k * TICK
         posture.on_tick(stamp, {
-            'joint_states': joints, 'imu': (stamp + imu_ns, level), 'foot_contacts': None,
+            'joint_states': (stamp, joints), 'imu': (stamp + imu_ns, level), 'foot_contacts': None,
             'canonical_state': (tick.x, tick.x_dot, tick.gait), 'reference': tick.r})
         assert len(sent) == published
     later = stamp + posture_control.FORGOTTEN_NS + TICK
     for k in range(posture_control.MOST_WAITED + 1):  # an IMU that is dead is waited for a while
         posture.on_tick(later + k * TICK, {
-            'joint_states': joints, 'imu': None, 'foot_contacts': None,
+            'joint_states': (later + k * TICK, joints), 'imu': None, 'foot_contacts': None,
             'canonical_state': (tick.x, tick.x_dot, tick.gait), 'reference': tick.r})
         assert len(sent) == (2 if k < posture_control.MOST_WAITED else 3)
 
@@ -586,7 +586,8 @@ def test_a_posture_control_that_comes_back_tells_no_mode_before_it_knows_it(ros:
     robot = PerfectTrackingRobot(load_description(SUITE.robot_file), TICK, 'lying')
     state, tick = robot.reset(1000 * TICK), walked(1)[2]
     posture.on_tick(state.time_ns, {
-        'joint_states': (state.joint_position, state.joint_velocity, state.joint_effort),
+        'joint_states': (state.time_ns, (
+            state.joint_position, state.joint_velocity, state.joint_effort)),
         'ground_truth': (state.base_position_in_world, state.base_quaternion,
                          state.base_velocity_in_base, state.base_rate_in_base),
         'canonical_state': (tick.x, tick.x_dot, tick.gait), 'reference': tick.r})

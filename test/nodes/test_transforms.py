@@ -83,7 +83,8 @@ def turn_on_the_spot(node: Any) -> None:
     for stamp in range(0, 104_000_000, 4_000_000):
         state = standing_state(robot, stamp)
         body.state(stamp, {
-            'joint_states': (state.joint_position, state.joint_velocity, state.joint_effort),
+            'joint_states': (stamp, (
+                state.joint_position, state.joint_velocity, state.joint_effort)),
             'imu': (stamp, (np.array((0.0, 0.0, 0.5)), state.acceleration_in_base)),
             'foot_contacts': (stamp, state.foot_force)})
 

@@ -8,8 +8,10 @@ everything else; contacts while the force of another one changes. No body change
 ``JUMP`` from one tick to the next.
 
 Angles and velocities of a joint tell the same motion twice: over a time t its angle changes by
-the mean velocity times t, but for what accelerations change meanwhile, which goes with t². A leg
-with a joint that breaks this is doubted. Where all legs do at once it is what carries the readings
+the mean velocity times t, but for what accelerations change meanwhile, which goes with t²; t is
+that between the stamps of the joints, which are not those of the ticks where messages come late or
+get lost, and what is older than what was heard is not judged. A leg with a joint that breaks this
+is doubted. Where all legs do at once it is what carries the readings
 that fails, and nothing of it is believed.
 
 What lasts is no proof: an offset that comes in one tick is told as steadily as the truth. A leg is
@@ -135,14 +137,20 @@ NEVER = (-1,) * (1 + 2 * N)
 def first_watch(readings: SensorReadings) -> SensorWatch:
     """Memory after the first readings."""
     usable = np.where(np.isfinite(readings.joint_position), readings.joint_position, 0.0)
-    now = readings.time_ns
+    now = readings.joints_ns
     return SensorWatch(readings, NEVER, usable, NEVER, (now,) * (3 * N), usable, NOBODY)
 
 
 def without_frozen(watch: SensorWatch, readings: SensorReadings
                    ) -> tuple[SensorWatch, SensorReadings]:
     """Readings in which those of sensors that freeze or jump are missing (NaN)."""
-    heard, jumps = _heard(watch, readings)
+    last, heard, jumps = watch.readings, watch.heard_ns, dict[int, float]()
+    if readings.joints_ns >= last.joints_ns:
+        heard, jumps = _heard(watch, readings)
+    else:  # newer ones have been used already
+        readings = replace_unchecked(
+            readings, joints_ns=last.joints_ns, joint_position=last.joint_position,
+            joint_velocity=last.joint_velocity)
     doubt = watch.doubt
     if jumps or any(doubt.legs):
         doubt = _in_doubt(watch, readings, jumps)
@@ -160,7 +168,7 @@ def without_frozen(watch: SensorWatch, readings: SensorReadings
 def _heard(watch: SensorWatch, readings: SensorReadings
            ) -> tuple[tuple[int, ...], dict[int, float]]:
     """Stamps at which each joint was heard last, and by how much joints jumped [rad]."""
-    last, now, heard, jumps = watch.readings, readings.time_ns, [], {}
+    last, now, heard, jumps = watch.readings, readings.joints_ns, [], {}
     for i, (q, before, rate, rate_before, heard_ns) in enumerate(zip(
             readings.joint_position.tolist(), last.joint_position.tolist(),
             readings.joint_velocity.tolist(), last.joint_velocity.tolist(), watch.heard_ns,
@@ -258,7 +266,7 @@ def _without(readings: SensorReadings, imu: bool, legs: ArrayLike, contacts: Arr
         np.where(part, np.nan, readings.joint_velocity), readings.joint_effort,
         nothing if imu else readings.rate_in_base,
         nothing if imu else readings.specific_force_in_base,
-        np.where(contacts, np.nan, readings.foot_force))
+        np.where(contacts, np.nan, readings.foot_force), readings.joints_ns)
 
 
 def without_imu(readings: SensorReadings) -> SensorReadings:

@@ -34,6 +34,9 @@ class SensorReadings:
         Gyroscope [rad/s] and accelerometer [m/s^2] at the origin of ``base_link``.
     foot_force : ndarray (4,)
         Normal force of each foot [N].
+    joints_ns : int
+        Stamp at which the joints were so [ns], where messages come late or get lost; by default
+        that of all.
     imu_is_usable : bool
         Whether gyroscope and accelerometer both say something possible.
     usable_legs, usable_contacts : tuple of 4 bool
@@ -47,6 +50,7 @@ class SensorReadings:
     rate_in_base: Array
     specific_force_in_base: Array
     foot_force: Array
+    joints_ns: int = -1
 
     imu_is_usable: bool = field(init=False)
     usable_legs: tuple[bool, ...] = field(init=False)
@@ -63,7 +67,8 @@ class SensorReadings:
         vars(self).update(
             imu_is_usable=_within(self.rate_in_base, FASTEST_TURN) and _within(
                 self.specific_force_in_base, HARDEST_BLOW),
-            usable_legs=legs, usable_contacts=contacts)
+            usable_legs=legs, usable_contacts=contacts,
+            joints_ns=self.time_ns if self.joints_ns < 0 else self.joints_ns)
 
 
 def _within(values: Array, limit: float) -> bool:

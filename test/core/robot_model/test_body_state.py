@@ -38,7 +38,7 @@ from dmp_cpg_ros.nodes.posture_control import sensor_readings
 
 processes, ros_domain, ros = ros_processes.processes, ros_processes.ros_domain, ros_processes.ros
 
-JOINTS = (np.zeros(12), np.zeros(12), np.zeros(12))
+JOINTS = (8, (np.zeros(12), np.zeros(12), np.zeros(12)))
 IMU = (np.ones(3), np.full(3, 2.0))
 FORCE = np.full(4, 20.0)
 
@@ -49,6 +49,14 @@ def test_readings_of_one_stamp_belong_together() -> None:
     assert np.array_equal(readings.rate_in_base, IMU[0])
     assert np.array_equal(readings.specific_force_in_base, IMU[1])
     assert np.array_equal(readings.foot_force, FORCE)
+    assert readings.joints_ns == 8
+
+
+def test_joints_of_another_stamp_are_told_with_it() -> None:
+    """Of the newest, which is used where a tick's own are lost."""
+    values = {'joint_states': JOINTS, 'imu': (12, IMU), 'foot_contacts': (12, FORCE)}
+    readings = sensor_readings(12, values)
+    assert (readings.time_ns, readings.joints_ns) == (12, 8) and all(readings.usable_legs)
 
 
 @pytest.mark.parametrize('old', [(4, IMU), None])
