@@ -14,13 +14,14 @@ from typing import Any
 from dmp_cpg_ros.analysis.strict_json import to_json, write_json
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, given_file, run_command
 from dmp_cpg_ros.configuration import ROBOTS, find_config
-from dmp_cpg_ros.core.certificates import inequality, proof, suggest, votes
+from dmp_cpg_ros.core.certificates import inequality, suggest, votes
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.maths.rounding import no_less
+from dmp_cpg_ros.core.proofs import proof
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.suite import Suite, load_suite
@@ -177,7 +178,8 @@ def _parser() -> argparse.ArgumentParser:
     add('--robot', metavar='FILE', help='robot file instead of the one that the file names')
     add('--json', action='store_true', help='print JSON instead of a table')
     add('--proof', metavar='FILE', type=Path,
-        help='write witnesses that check_proof.py checks exactly, when it holds')
+        help='write witnesses that check_proof.py and, of the step that runs, check_step.py '
+        'check exactly, when it holds')
     add('--suggest', action='store_true', help='propose coupling and inhibition gains that hold')
     return parser
 

@@ -35,12 +35,12 @@ from dmp_cpg_ros.commands.certify import running_setting
 from dmp_cpg_ros.commands.ros_arguments import run_command
 from dmp_cpg_ros.commands.run_folder import run_context
 from dmp_cpg_ros.configuration import find_config, naming
-from dmp_cpg_ros.core.certificates import check_proof
 from dmp_cpg_ros.core.certificates.certify import certify
-from dmp_cpg_ros.core.certificates.proof import proof_of
 from dmp_cpg_ros.core.learning.discrete import learn_discrete
 from dmp_cpg_ros.core.learning.rhythmic import learn_rhythmic
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
+from dmp_cpg_ros.core.proofs import check_proof
+from dmp_cpg_ros.core.proofs.proof import proof_of
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.core.transformation.learned_motion import MOTION_NAMES
 from dmp_cpg_ros.primitive_files import load_motion, load_primitive, save_primitive

@@ -17,21 +17,25 @@ import argparse
 import json
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import partial
 
 import numpy as np
 
 from dmp_cpg_ros.analysis.strict_json import to_json
-from dmp_cpg_ros.core.certificates import check_proof, proof
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.proofs import check_proof, check_step, proof
 from dmp_cpg_ros.studies.certificate_settings import grid, random_setting
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table
 from dmp_cpg_ros.studies.proof_claims import Values, refuted
 from dmp_cpg_ros.studies.spoiled_proofs import DAMAGES, FORGERIES, REFUSALS, damaged, forged
+from dmp_cpg_ros.studies.spoiled_steps import STEP_FORGERIES, forged_step, refuted_step
 from dmp_cpg_ros.studies.workers import Workers
+
+LIES = {**FORGERIES, **STEP_FORGERIES}
+"""Kinds of forgery, of the step too."""
 
 REFUSED, WRONG, TRUE, CAREFUL, SAME = (
     'refused', 'ACCEPTED', 'accepted, nothing refuted', 'refused, nothing refuted', 'unchanged')
@@ -64,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         false = [names for names in workers.map(_refuted, texts, 20) if names]
         print(f'claims of the {len(texts)} proofs that are refuted: {false or "none"}\n',
               flush=True)
-        for first, kinds in enumerate((DAMAGES, FORGERIES)):
+        for first, kinds in enumerate((DAMAGES, LIES)):
             done = 0
             while sum(counts[kind, REFUSED] for kind in kinds) < options.mutations // 2:
                 block = [(options.seed, first, done + k) for k in range(200)]
@@ -73,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     verdicts = [REFUSED, WRONG, TRUE, CAREFUL, SAME]
     print(markdown_table(['spoiled', *verdicts], [
         [kind, *(str(counts[kind, verdict]) for verdict in verdicts)]
-        for kind in (*DAMAGES, *FORGERIES)] + [['all', *(str(sum(
+        for kind in (*DAMAGES, *LIES)] + [['all', *(str(sum(
             number for (_, one), number in counts.items() if one == verdict))
             for verdict in verdicts)]]))
     return int(bool(wrong or false or any(one == WRONG for _, one in counts)))
@@ -84,8 +88,10 @@ def _told(name: str, found: list[tuple[bool, str]]) -> int:
     counts = Counter((certified, bool(text)) for certified, text in found)
     proved, missing, unasked = counts[True, True], counts[True, False], counts[False, True]
     refused = sum(not accepted(text) for _, text in found if text)
+    stepped = sum(bool(text and json.loads(text)['step']) for _, text in found)
     print(f'{name}: {len(found)} settings, {proved + missing} certified, {proved} of them with a '
-          f'proof; {unasked} proofs of others; {refused} proofs refused', flush=True)
+          f'proof, {stepped} with one of the step; {unasked} proofs of others; {refused} proofs '
+          'refused', flush=True)
     return missing + unasked + refused
 
 
@@ -104,9 +110,12 @@ def random_attempt(seed: tuple[int, int]) -> tuple[bool, str]:
 
 
 def accepted(text: str) -> bool:
-    """Whether the checker accepts a file."""
+    """Whether the checkers accept a file, and what it has of the step."""
     try:
-        check_proof.check(json.loads(text, object_pairs_hook=check_proof.once))
+        found = json.loads(text, object_pairs_hook=check_proof.once)
+        check_proof.check(found)
+        if found['step']:
+            check_step.check(found)
     except REFUSALS:
         return False
     return True
@@ -120,7 +129,12 @@ def _keep(texts: list[str]) -> None:
 
 
 def _refuted(text: str) -> list[str]:
-    return refuted(*parts(text))
+    return all_refuted(text, np.random.default_rng(0))
+
+
+def all_refuted(text: str, rng: np.random.Generator) -> list[str]:
+    """Claims of a proof that do not hold in floating point, those of its step included."""
+    return refuted(*parts(text)) + (refuted_step(text, rng) if json.loads(text)['step'] else [])
 
 
 def parts(text: str) -> tuple[Values, Values]:
@@ -132,7 +146,7 @@ def parts(text: str) -> tuple[Values, Values]:
 def _spoilt(seed: tuple[int, int, int]) -> tuple[str, str]:
     rng = np.random.default_rng(seed)
     text, other = (_texts[rng.integers(len(_texts))] for _ in range(2))
-    kinds = (DAMAGES, FORGERIES)[seed[1]]
+    kinds: Collection[str] = (DAMAGES, LIES)[seed[1]]
     kind = list(kinds)[seed[2] % len(kinds)]
     return kind, verdict(text, kind, other, rng)
 
@@ -149,6 +163,12 @@ def verdict(text: str, kind: str, other: str, rng: np.random.Generator) -> str:
         if not accepted(changed):
             return REFUSED
         return WRONG if refuted(*parts(changed)) else TRUE
+    if kind in STEP_FORGERIES:
+        if not json.loads(text)['step']:
+            return SAME
+        changed = forged_step(text, kind, rng)
+        false, taken = refuted_step(changed, rng), accepted(changed)
+        return (WRONG if taken else REFUSED) if false else TRUE if taken else CAREFUL
     p, w = parts(text)
     changed, w = forged(p, w, json.loads(text)['rows'], kind, rng)
     false, taken = refuted(p, w), accepted(changed)

@@ -13,7 +13,7 @@ pytest.importorskip('mujoco')  # the robot's geometry is read from its model
 
 from dmp_cpg_ros.commands.certify import main
 from dmp_cpg_ros.configuration import find_config
-from dmp_cpg_ros.core.certificates.check_proof import check
+from dmp_cpg_ros.core.proofs.check_proof import check
 
 
 def file_with(folder: Path, **changes: object) -> str:

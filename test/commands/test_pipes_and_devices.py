@@ -19,8 +19,8 @@ from synthetic_walk import SyntheticWalk
 
 from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.commands import analyze, certify, film, inspect_robot, learn
-from dmp_cpg_ros.core.certificates import check_proof
 from dmp_cpg_ros.core.errors import MissingFileError
+from dmp_cpg_ros.core.proofs import check_proof
 from dmp_cpg_ros.robot.robot_file import own_robot_file
 
 Main = Callable[[Sequence[str]], int]

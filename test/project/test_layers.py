@@ -50,7 +50,8 @@ LAYERS = {
 
 CORE = ['errors', 'maths', 'clock', 'parameters', 'robot_model', 'canonical', 'gait', 'reference',
         'primitives', 'learning', 'transformation', 'contraction', 'voting', 'inhibition',
-        'balance', 'estimation', 'modes', 'suite_parameters', 'certificates', 'scenario', 'loop']
+        'balance', 'estimation', 'modes', 'suite_parameters', 'certificates', 'proofs', 'scenario',
+        'loop']
 """Folders and files of the core, each above all that it may import."""
 
 

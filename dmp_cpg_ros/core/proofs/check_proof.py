@@ -196,7 +196,7 @@ def rows(p: Any, w: Any) -> dict[str, tuple[F, F]]:
 
 def check(proof: Any) -> dict[str, tuple[F, F]]:
     """Return both sides of every inequality; raise an error unless the proof is one."""
-    need(len(proof) == 4 and proof['format'] == 'dmp_cpg_ros proof 2', 'format')
+    need(len(proof) == 5 and proof['format'] == 'dmp_cpg_ros proof 3', 'format')
     found = rows(read(proof['parameters']), read(proof['witnesses']))
     need(read(proof['rows']) == {name: list(sides) for name, sides in found.items()} and all(
         left < right for left, right in found.values()), 'rows')

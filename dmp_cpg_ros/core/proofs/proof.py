@@ -4,7 +4,7 @@
 
 The witnesses are found in double precision, rounded to the safe side on a binary grid, and
 completed in rational arithmetic with the formulas of
-:mod:`~dmp_cpg_ros.core.certificates.check_proof`. doc/certificate.md describes the format.
+:mod:`~dmp_cpg_ros.core.proofs.check_proof`. doc/certificate.md describes the format.
 """
 
 from __future__ import annotations
@@ -17,14 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.certificates import check_proof as exact
 from dmp_cpg_ros.core.certificates.network import NetworkAnalysis, Setting, analyse_network
-from dmp_cpg_ros.core.certificates.step import cycle_radius_error
+from dmp_cpg_ros.core.certificates.step import cycle_radius_error, stepped_network
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL
 from dmp_cpg_ros.core.contraction.synchronisation import cascade_weights, slowest_rate
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.proofs import check_proof as exact
+from dmp_cpg_ros.core.proofs.step_proof import step_proof
 
 Values = dict[str, Any]
 
@@ -46,7 +47,7 @@ def proof_of(s: Setting) -> Values:
     -------
     dict
         What strict JSON can write, for
-        :func:`~dmp_cpg_ros.core.certificates.check_proof.check`.
+        :func:`~dmp_cpg_ros.core.proofs.check_proof.check`.
 
     Raises
     ------
@@ -66,7 +67,8 @@ def proof_of(s: Setting) -> Values:
     for regional, slower in product(reaches, _SLOWER):
         try:
             w = completed(p, _chosen(p, analysis, shares, regional, slower))
-            proof = written(p, w, exact.rows(p, w))
+            proof = written(p, w, exact.rows(p, w), step_proof(
+                p, w['xi'], stepped_network(s, analysis)))
             exact.check(proof)
             return proof
         except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
@@ -74,10 +76,10 @@ def proof_of(s: Setting) -> Values:
     raise ParameterError(f'no exact proof is found: {reason}')
 
 
-def written(p: Values, w: Values, rows: Values) -> Values:
-    """Parameters, witnesses and rows as they stand in a file."""
-    return {'format': 'dmp_cpg_ros proof 2', 'parameters': _written(p),
-            'witnesses': _written(w), 'rows': _written(rows)}
+def written(p: Values, w: Values, rows: Values, step: Values) -> Values:
+    """Parameters, witnesses, rows and what is proved of the step as they stand in a file."""
+    return {'format': 'dmp_cpg_ros proof 3', 'parameters': _written(p),
+            'witnesses': _written(w), 'rows': _written(rows), 'step': _written(step)}
 
 
 def _parameters(s: Setting, analysis: NetworkAnalysis) -> Values:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,6 +16,7 @@ from dataclasses import replace
 from fractions import Fraction
 from itertools import count
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -25,13 +27,14 @@ from house import code_lines
 from dmp_cpg_ros.core.canonical.coupling import Edges, graph_from_edges
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.certificates import check_proof
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.inequality import STEP_ROWS, Certificate
 from dmp_cpg_ros.core.certificates.network import Setting
-from dmp_cpg_ros.core.certificates.proof import proof_of
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.maths.exponential import phi_functions
+from dmp_cpg_ros.core.proofs import check_proof, check_step
+from dmp_cpg_ros.core.proofs.proof import proof_of
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 P = suite_parameters()
@@ -185,10 +188,14 @@ def test_mutated_proofs_are_refused() -> None:
                  proof(*regional[:3])]
     for original in originals:
         check_proof.check(original)
+        if original['step']:
+            check_step.check(original)
         for _ in range(80):
             changed = mutated(original, rng)
             with pytest.raises((ArithmeticError, LookupError, TypeError, ValueError)):
                 check_proof.check(changed)
+                if original['step']:
+                    check_step.check(changed)
 
 
 @pytest.mark.parametrize(('name', 'value'), [
@@ -207,13 +214,72 @@ def test_a_proof_is_not_accepted_for_parameters_that_are_worse(name: str, value:
         check_proof.check(changed)
 
 
-def test_the_checker_can_be_read_at_a_sitting() -> None:
-    assert code_lines(Path(check_proof.__file__)) <= 150
+@pytest.mark.parametrize('gait', GAITS)
+@pytest.mark.parametrize('tick', [0.001, TICK, 0.01])
+def test_the_step_of_every_gait_has_a_proof_that_says_what_certify_does(gait: str, tick: float
+                                                                        ) -> None:
+    certificate = certify(running(network(gait), tick=tick))
+    found = check_step.check(proof(network(gait), tick=tick))
+    assert set(found) == {'step_premises', *STEP_ROWS} and certificate['step_capture'].required
+    length = tick / max(1, round(tick / 0.005))
+    farthest, r0 = map(float, found['step_capture'])
+    assert farthest / r0 == pytest.approx(certificate['step_capture'].left, rel=0.02)
+    for name, slower in (('step_contraction', 0.06), ('step_synchronisation', 0.06)):
+        rate = -np.log(float(found[name][0])) / length
+        assert rate == pytest.approx(certificate[name].right, rel=slower)
 
 
-def test_the_checker_is_a_script_of_its_own(tmp_path: Path) -> None:
-    path, script = tmp_path / 'proof.json', tmp_path / 'check_proof.py'
-    script.write_bytes(Path(check_proof.__file__).read_bytes())
+def test_a_setting_whose_step_is_not_proved_has_a_proof_without_it() -> None:
+    for gait, inhibition, tick, certificate in settings(count(), (1.5, 8.0)):
+        if certificate['time_step'].required:
+            found = proof(gait, inhibition, tick)
+            check_proof.check(found)
+            assert found['step'] == {}
+            with pytest.raises(LookupError):
+                check_step.check(found)
+            return
+
+
+@pytest.mark.parametrize(('name', 'worse'), [
+    ('omega_max', 3), ('tick', Fraction(5, 4)), ('rho', 3), ('region_radius', Fraction(1, 2))])
+def test_a_proof_of_the_step_is_not_accepted_for_parameters_that_are_worse(
+        name: str, worse: Fraction) -> None:
+    changed = proof(network())
+    changed['parameters'][name] = str(Fraction(changed['parameters'][name]) * worse)
+    with pytest.raises(ValueError):
+        check_step.check(changed)
+
+
+def test_the_functions_of_the_step_are_exact_far_beyond_what_is_added() -> None:
+    rng = np.random.default_rng(1)
+    for size in (0.3, 3.0, 300.0):
+        z = size * rng.random((4, 4)) * (np.eye(4) - 1.0)
+        z -= np.diag(z.sum(axis=1) - size * rng.random(4))
+        whole = [[int(Fraction(x) * check_step.ONE) for x in row] for row in z.tolist()]
+        for share, found in zip((0.5, 1.0), check_step.phi(whole), strict=True):
+            for here, there in zip(found, phi_functions(-share * z), strict=True):
+                assert np.abs(np.array(here, dtype=float) / check_step.ONE - there).max() < 1e-13
+        half, full = (np.array(of, dtype=object) for of in check_step.phi(whole))
+        squared = half[0] @ half[0] // check_step.ONE                  # phi_0 twice as far
+        recursion = np.array(check_step.diagonal([check_step.ONE] * 4)) - np.array(
+            whole) @ full[1] // check_step.ONE                          # 1 - z phi_1
+        for other in (squared, recursion):
+            assert np.abs(other - full[0]).max() < check_step.ONE >> 350
+
+
+@pytest.mark.parametrize('checker', [check_proof, check_step])
+def test_a_checker_can_be_read_at_a_sitting(checker: ModuleType) -> None:
+    path = Path(str(checker.__file__))
+    assert code_lines(path) <= 150
+    text = path.read_text(encoding='utf-8')
+    imported = re.findall(r'^(?:import|from) (\w+)', text, re.MULTILINE)
+    assert set(imported) == {'json', 'os', 'sys', 'fractions', 'typing'}
+
+
+@pytest.mark.parametrize('checker', [check_proof, check_step])
+def test_a_checker_is_a_script_of_its_own(checker: ModuleType, tmp_path: Path) -> None:
+    path, script = tmp_path / 'proof.json', tmp_path / 'checker.py'
+    script.write_bytes(Path(str(checker.__file__)).read_bytes())
     found = proof(network())
     path.write_text(json.dumps(found), encoding='utf-8')
 
@@ -225,7 +291,7 @@ def test_the_checker_is_a_script_of_its_own(tmp_path: Path) -> None:
 
     assert status() == 0
     text = path.read_text(encoding='utf-8')
-    found['witnesses']['rate'] = '1'
+    found['witnesses']['rate'] = found['step']['witnesses']['disc'] = '1'
     for changed in (json.dumps(found), text[:-1], text.replace('{', '{"format": "", ', 1),
                     text.replace('"rho": "8"', '"rho": NaN'),
                     text.replace('"rho": "8"', '"rho": "8e999999999"'), '[' * 100_000):
