@@ -8,6 +8,7 @@ import argparse
 import math
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,8 @@ from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.core.certificates import inequality, suggest, votes
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.inequality import Certificate
-from dmp_cpg_ros.core.certificates.network import Setting
+from dmp_cpg_ros.core.certificates.network import Setting, split_premises
+from dmp_cpg_ros.core.contraction.delays import Premise
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.maths.rounding import no_less
@@ -63,13 +65,17 @@ def _certify(options: argparse.Namespace, ros: RosArguments) -> int:
                                  '--proof needs all of them to be off')
         write_json(options.proof, proof.proof_of(of_gait))
     if options.json:
-        content = _mapping(suite, certificate, needed)
+        content = _mapping(suite, certificate, needed) | {
+            'split_couplings': [
+                {**premise._asdict(), 'holds': premise.holds, 'kept_by': keeper}
+                for keeper, each in _premises(of_gait, certificate).items() for premise in each]}
         if options.suggest:
             content['suggestion'] = suggestion and {
                 name: getattr(suggestion, name) for name in ('coupling_gain', 'inhibition_gain')}
         print(to_json(content), end='')
     else:
-        lines = _report(suite, of, certificate, needed)
+        lines = [*_report(suite, of, certificate, needed)]
+        lines[-2:-2] = ['', *_told_premises(_premises(of_gait, certificate))]
         print('\n'.join([*lines, '', *_suggested(suggestion)] if options.suggest else lines))
     for entry in certificate.failing:
         print(f'certify: fails: {entry.explained()}', file=sys.stderr)
@@ -136,6 +142,27 @@ def _table(inequalities: Sequence[inequality.Inequality]) -> list[str]:
     head, *lines = ('  '.join(map(str.ljust, row, widths)).rstrip() for row in rows)
     told = (f'    {entry.sentence}' for entry in inequalities)
     return [head, *(line for pair in zip(lines, told, strict=True) for line in pair)]
+
+
+def _premises(s: Setting, certificate: Certificate) -> dict[str, list[Premise]]:
+    """Premises of ``carried_coupling`` by who keeps them; of ``auto``, with the first leg."""
+    inhibition = replace(s.parameters.inhibition, inhibited_legs=certificate.legs[:1]) if (
+        s.parameters.inhibition.auto) else s.parameters.inhibition
+    kept, asked = split_premises(
+        replace(s, parameters=replace(s.parameters, inhibition=inhibition)), certificate.contact)
+    return {'parameters': kept, 'nobody': asked}
+
+
+def _told_premises(premises: dict[str, list[Premise]]) -> list[str]:
+    """Two lines for each premise, as in the table."""
+    rows = [(premise.name, {'nobody': 'is asked for'}.get(
+        keeper, 'holds' if premise.holds else 'no'), f'{premise.value:.4g} <= {premise.limit:.4g}',
+        premise.unit or '-', premise.sentence) for keeper, each in premises.items()
+        for premise in each]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)][:-1]
+    return ['carried_coupling is for couplings that are split over nodes, as the suite does not; '
+            'it takes for granted', *(line for *cells, sentence in rows for line in (
+                '  '.join(map(str.ljust, cells, widths)).rstrip(), f'    {sentence}'))]
 
 
 def _votes(needed: votes.VotesNeeded) -> str:

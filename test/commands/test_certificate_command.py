@@ -46,6 +46,28 @@ def test_gaits_that_are_chosen_are_certified_together_as_the_nodes_do(
     assert 'auto_gait' in capsys.readouterr().err
 
 
+@pytest.mark.parametrize('legs', ['[fl]', '[auto]'])
+def test_what_split_couplings_take_for_granted_is_told_with_its_numbers(
+        legs: str, capsys: pytest.CaptureFixture[str]) -> None:
+    given = ['--ros-args', '-p', f'inhibited_legs:={legs}']
+    assert main(['--json', *given]) == 0
+    found = json.loads(capsys.readouterr().out)
+    premises = {premise['name']: premise for premise in found['split_couplings']}
+    assert {name: premise['holds'] for name, premise in premises.items()} == {
+        'not_backwards': True, 'length_of_c': True, 'older_samples': True,
+        'places_before': False, 'armed_before': False}
+    assert all(premise['holds'] == (premise['kept_by'] == 'parameters')
+               for premise in premises.values())
+    age = found['inequalities']['carried_coupling']['left']
+    assert premises['armed_before']['value'] == pytest.approx(
+        age * premises['not_backwards']['limit'], rel=1e-6)      # of a radius of 1
+    assert main(given) == 0
+    told = capsys.readouterr().out
+    for name, premise in premises.items():
+        word = 'holds' if premise['holds'] else 'is asked for'
+        assert f'{name:<13}  {word:<12}  {premise["value"]:.4g} <= ' in told
+
+
 @pytest.mark.parametrize('gait', ['walk', 'trot', 'pace', 'bound', 'pronk'])
 def test_every_gait_can_be_certified(gait: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(['--ros-args', '-p', f'gait:={gait}']) == 0

@@ -19,7 +19,15 @@ from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.contraction import inhibited
 from dmp_cpg_ros.core.contraction.capture import CaptureSet, capture_set
 from dmp_cpg_ros.core.contraction.capture_anywhere import needed_gain_anywhere
-from dmp_cpg_ros.core.contraction.delays import Capture, carried_margin, held_margin, late_margin
+from dmp_cpg_ros.core.contraction.delays import (
+    Capture,
+    Premise,
+    asked_premises,
+    carried_margin,
+    carried_premises,
+    held_margin,
+    late_margin,
+)
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium, inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, PROVED
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound, mismatch_margin
@@ -177,6 +185,16 @@ def armed_capture(s: Setting, analysis: NetworkAnalysis, contact: ContactLimits 
     omega = s.span.omega_armed[1] + (contact.own if contact else 0.0)
     return Capture(s.network.system, omega, analysis.capture.gains, r0,
                    *entry_tolerances(s.network, r0))
+
+
+def split_premises(s: Setting, contact: ContactLimits | None
+                   ) -> tuple[list[Premise], list[Premise]]:
+    """Premises of ``carried_coupling`` where couplings are split over nodes: those that follow
+    from parameters, and those that the suite's gate does not keep, because it splits none.
+    """
+    capture = armed_capture(s, analyse_network(s.network, s.parameters.inhibition, s.span),
+                            contact)
+    return carried_premises(capture), asked_premises(capture, EXPECTED_TICKS * s.tick_s)
 
 
 def _contraction(found: InhibitedContraction) -> Inequality:

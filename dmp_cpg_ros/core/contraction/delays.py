@@ -22,6 +22,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import acos, asin, cos, exp, inf, pi, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,20 +116,50 @@ class Capture:
                              np.full(len(self.gains), r0))
         return (self.gains * r0 - out - pull)[self.held]
 
-
-    def outweighs(self, pull: float, behind: float, off: float = 0.0) -> bool:
-        """Whether rotation outweighs a pull by samples from before the capture, which are outside
-        of C by at most ``behind``, and off the cycle by ``off`` more than the gate allows.
+    def backwards(self, pull: float, behind: float) -> float:
+        """What a pull by samples from before the capture takes of what rotation leads back by;
+        they are outside of C by at most ``behind``. Above 1 it may lead out, infinite where
+        nothing is known.
 
         Such a sample pulls outwards along n where rotation leads back: with an angle of at most χ
         between the sample's direction from x_d and the flow there, −ω r cos(n, flow) + pull
         cos(n, sample) ≤ ω r (2 sin(χ/2) + max(0, pull/ω r − 1)), not above ω r where this is 1.
         """
         r, r0 = self.radius, self.region_radius
-        off = self.radii + off
-        sine = off * (1.0 + off / (2.0 * r)) / r0 + (r0 + behind) / (2.0 * r)
+        sine = self.radii * (1.0 + self.radii / (2.0 * r)) / r0 + (r0 + behind) / (2.0 * r)
         more = max(0.0, pull / (self.omega * r) - 1.0)
-        return sine <= 1.0 and 2.0 * sin(0.5 * asin(sine)) + more <= 1.0
+        return 2.0 * sin(0.5 * asin(sine)) + more if sine <= 1.0 else inf
+
+    def outweighs(self, pull: float, behind: float) -> bool:
+        """Whether rotation outweighs such a pull."""
+        return self.backwards(pull, behind) <= 1.0
+
+
+class Premise(NamedTuple):
+    """What has to be so where couplings are split over nodes: value ≤ limit.
+
+    Attributes
+    ----------
+    name : str
+        A word with underscores.
+    value, limit : float
+        Both sides.
+    unit : str
+        Of both, empty for pure numbers.
+    sentence : str
+        What it says.
+    """
+
+    name: str
+    value: float
+    limit: float
+    unit: str
+    sentence: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether it is so beyond rounding."""
+        return self.value <= self.limit * (1.0 + 1e-9)
 
 
 def late_margin(capture: Capture) -> float:
@@ -229,15 +260,40 @@ def carried_margin(capture: Capture) -> float:
     float
         0 without a certificate, infinite otherwise: capture does not depend on the age.
     """
-    r, r0, p, held = capture.radius, capture.region_radius, capture.places, capture.held
-    ahead = float(capture.coupling.sum(axis=1).max()) * p       # what places may pull back by
-    if not (capture.undelayed.holds and capture.contracts(p) and capture.radii < r
-            and ahead <= capture.omega * r * (1.0 + 1e-9)):
-        return 0.0
-    crossed = min(_arc(r, R, r0) * R for R in (r - capture.radii, r + capture.radii))
-    pull = float(capture.coupling[:, held].sum(axis=1).max()) * p
-    borne = capture.outweighs(pull, p) or r0 + p <= _largest_box(capture)[0]
-    return inf if borne and crossed >= 4.0 * p else 0.0
+    return inf if (capture.undelayed.holds and capture.contracts(capture.places)
+                   and capture.radii < capture.radius
+                   and all(premise.holds for premise in carried_premises(capture))) else 0.0
+
+
+def carried_premises(capture: Capture) -> list[Premise]:
+    """Premises of :func:`carried_margin` that follow from parameters."""
+    r, r0, p, omega = capture.radius, capture.region_radius, capture.places, capture.omega
+    ahead = float(capture.coupling.sum(axis=1).max()) * p
+    crossed = min(_arc(r, R, r0) * R for R in (max(r - capture.radii, 1e-9), r + capture.radii))
+    share = capture.backwards(float(capture.coupling[:, capture.held].sum(axis=1).max()) * p, p)
+    weighed = Premise('older_samples', share, 1.0, '',
+                      'what samples from before the capture pull outwards, over what rotation '
+                      'leads back')
+    if not weighed.holds:
+        weighed = Premise('older_samples', r0 + p, _largest_box(capture)[0], '',
+                          'distance of samples from before the capture that inhibition bears')
+    return [
+        Premise('not_backwards', ahead, omega * r, '1/s',
+                'what legs in their places pull each other back by, against what they turn'),
+        Premise('length_of_c', 4.0 * p, crossed, '',
+                'C is as long as legs may be apart while they come in'), weighed]
+
+
+def asked_premises(capture: Capture, age: float) -> list[Premise]:
+    """Premises of :func:`carried_margin` that a gate would have to keep: what the suite's admits,
+    against what samples of an age [s] need.
+    """
+    return [
+        Premise('places_before', capture.places, 0.5 * capture.places, '',
+                'legs this close to their places for the age of samples before one comes into C'),
+        Premise('armed_before', capture.omega * age, 0.0, 'rad',
+                'turn before C at which all nodes know that inhibition is armed, and no leg is '
+                'inside; the gate leaves none')]
 
 
 def _arc(radius: float, R: float, region_radius: float) -> float:

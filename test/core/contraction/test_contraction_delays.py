@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
-from dmp_cpg_ros.core.contraction.delays import Capture
+from dmp_cpg_ros.core.contraction.delays import Capture, asked_premises, carried_premises
 from dmp_cpg_ros.studies.delayed_runs import PATTERNS, fails
 from dmp_cpg_ros.studies.delays import MARGINS, capture_of, gait_captures, random_captures
 
@@ -87,6 +87,29 @@ def test_a_region_that_is_hardly_longer_than_places_bears_no_carried_states() ->
     capture = captured()
     narrow = replace(capture, places=0.26 * 2.0 * np.arcsin(0.15) * 2.0)
     assert MARGINS['carried'](narrow) == 0.0
+
+
+@pytest.mark.parametrize(('name', 'changed'), [
+    ('length_of_c', {'places': 0.2}), ('not_backwards', {'omega': 4.0, 'places': 0.03}),
+    ('older_samples', {'region_radius': 0.02, 'radii': 0.02})])
+def test_a_premise_of_carried_states_that_does_not_hold_is_named(
+        name: str, changed: dict[str, float]) -> None:
+    capture = captured()
+    assert all(premise.holds for premise in carried_premises(capture))
+    spoiled = replace(capture, **changed)
+    failing = {premise.name: premise for premise in carried_premises(spoiled)
+               if not premise.holds}
+    assert failing[name].value > failing[name].limit
+    assert MARGINS['carried'](spoiled) == 0.0
+
+
+def test_what_no_gate_keeps_grows_with_the_age_of_samples() -> None:
+    capture = captured(omega=20.0)
+    places, armed = asked_premises(capture, 0.012)
+    assert not places.holds and not armed.holds
+    assert armed.value == pytest.approx(20.0 * 0.012)
+    assert places.limit == pytest.approx(0.5 * capture.places)
+    assert asked_premises(capture, 0.0)[1].holds
 
 
 def test_nothing_is_borne_where_capture_does_not_hold() -> None:
