@@ -14,7 +14,6 @@ from dmp_cpg_ros.configuration import naming, readable
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot import model_parts
@@ -27,6 +26,7 @@ from dmp_cpg_ros.robot.robot_file import (
     RobotFile,
     load_robot_file,
 )
+from dmp_cpg_ros.robot.soft_feet import standing_radius, with_rolling_radii
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 STANCE_LEG_SHARE = 0.7  # distance hip-foot over leg length when the model has no usable home pose
@@ -37,9 +37,6 @@ DAMPING_SHARE = 0.5
 Torque is held for the step, so that speed is multiplied by 1 - kd dt/I: above 1 it changes its
 sign at every step and the joint chatters, above 2 it grows."""
 _PLACE_OF_LEG = {'fl': (1, 1), 'fr': (1, -1), 'rl': (-1, 1), 'rr': (-1, -1)}  # signs of x, y
-
-BISECTIONS = 30
-"""Of the search for the rolling radius of the feet."""
 
 MOST_KEPT = 100_000
 """Largest model whose description is kept [bytes]."""
@@ -126,11 +123,12 @@ def read_description(model: mujoco.MjModel, file: RobotFile) -> RobotDescription
     free = 1.0 / np.diag(np.linalg.inv(joint_inertia))[joints].reshape(4, 3)  # 1/(M⁻¹)_jj
     kd = _damping(model, file, free.min(axis=0), DAMPING_TIME * np.sqrt(leg_length / GRAVITY)
                   * description.kp)
-    radius = _rolling_radius(model, standing, ids)
+    radius = standing_radius(model, standing, ids)
     legs = tuple(
         replace(leg, foot_radius=leg.foot_radius if radius is None else radius,
                 swing_inertia=float(joint_inertia[hip, hip]))
         for leg, hip in zip(legs, joints.reshape(4, 3)[:, 1], strict=True))
+    legs = with_rolling_radii(replace(description, legs=legs), model, ids)
     return replace(description, legs=legs, base_inertia=inertia, com_in_base=com, kd=kd)
 
 
@@ -226,46 +224,3 @@ def _composite_inertia(model: mujoco.MjModel, data: mujoco.MjData,
         inertia += (R * model.body_inertia[body]) @ R.T
         inertia += m * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     return com, inertia
-
-
-def _rolling_radius(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds) -> float | None:
-    """Distance from the feet's centres to where they touch while the robot stands on them.
-
-    Some models have soft feet (centimetres), which roll on a smaller radius than their shape says;
-    where the body's way is told from the joints, that shows as a wrong speed. The base is lowered
-    until inverse dynamics at rest finds contact forces that carry the weight.
-    MuJoCo's contact point, at which friction acts, is half as deep in the ground as the foot.
-
-    Parameters
-    ----------
-    model, data
-        MuJoCo's, the joints in the home pose; the base is moved.
-    ids : ModelIds
-        Base and feet.
-
-    Returns
-    -------
-    float or None
-        [m]; None where the feet have no contact sphere, or sink in to their centres.
-    """
-    radius = float(np.mean([foot.radius for foot in ids.feet]))
-    if radius == 0.0:
-        return None
-    weight = -float(model.body_subtreemass[model.body_rootid[ids.base]] * model.opt.gravity[2])
-    data.qvel[:] = data.qacc[:] = 0.0
-    wrench = np.zeros(6)
-
-    def carried(centre: float) -> bool:
-        mujoco.mj_kinematics(model, data)
-        heights = [float(foot_position(data, foot)[2]) for foot in ids.feet]
-        data.qpos[ids.base_qpos + 2] += centre - np.mean(heights)
-        mujoco.mj_inverse(model, data)
-        force = 0.0
-        for i in range(data.ncon):
-            mujoco.mj_contactForce(model, data, i, wrench)
-            force += float(wrench[0])
-        return force > weight
-
-    if not carried(0.0) or carried(radius):
-        return None
-    return 0.5 * (radius + last_that_holds(lambda c: not carried(c), radius, 0.0, BISECTIONS))

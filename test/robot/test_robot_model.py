@@ -14,9 +14,10 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_parts import find_ids
-from dmp_cpg_ros.robot.model_reader import load_description, pose
+from dmp_cpg_ros.robot.model_reader import load_description, pose, read_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file
+from dmp_cpg_ros.robot.soft_feet import standing_radius
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 # Cheetah-Software, MiniCheetah.h, left legs: mass [kg], centre of mass [m], inertia [1e-6 kg m^2].
@@ -215,6 +216,25 @@ def test_the_inertia_that_a_swing_moves_is_that_of_the_leg_about_its_hip():
         # that of a stance in which feet are not rolled over yet
         assert leg.swing_inertia == pytest.approx(2.0 * data.energy[1] / 2.0**2, rel=2e-3)
         assert leg.swing_inertia > leg.rotor_inertia[1]
+
+
+def test_soft_feet_roll_on_a_smaller_radius_under_more_weight():
+    file = load_robot_file(own_robot_file())
+    model = load_model(file.model, file.base)
+    ids = find_ids(model, file)
+    hard = read_description(model, file)
+    assert all(leg.rolling_radius is None for leg in hard.legs)
+    for foot in ids.feet:
+        for geom in foot.geoms:
+            model.geom_solref[geom], model.geom_priority[geom] = (0.04, 1.0), 1
+    soft = read_description(model, file)
+    standing, trotting = soft.legs[0].rolling_radius
+    assert standing == pytest.approx(soft.legs[0].foot_radius, abs=1e-5)
+    assert trotting < 0.95 * standing < standing < hard.legs[0].foot_radius
+    assert soft.legs[0].walking_radius == trotting
+    data = pose(model, ids, home_joint_position(soft))
+    model.body_subtreemass *= 2.0
+    assert standing_radius(model, data, ids) == pytest.approx(trotting, abs=1e-5)
 
 
 def test_a_model_that_has_changed_since_it_was_read_is_read_again(tmp_path):

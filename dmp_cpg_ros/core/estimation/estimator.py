@@ -255,7 +255,8 @@ class BodyEstimator:
         q, q_dot, legs = readings.joint_position, readings.joint_velocity, readings.usable_legs
         if not all(legs):  # a placeholder for legs that are left out later
             q, q_dot = (np.where(np.repeat(legs, 3), values, 0.0) for values in (q, q_dot))
-        return self.odometry.motion(q.tolist(), q_dot.tolist(), normal), normal
+        return self.odometry.motion(
+            q.tolist(), q_dot.tolist(), normal, readings.foot_force.tolist()), normal
 
     def _trust(self, readings: SensorReadings, motion: FootMotion, normal: vec3.Triple
                ) -> list[float]:

@@ -9,6 +9,8 @@ and with the body's velocity v, its angular velocity ω and the shank's s relati
 
 all in the base frame. The left side is what the filter predicts, the right side is measured from
 joints alone. Without the rolling term the velocity of Mini Cheetah's legs would be 8 % too small.
+A soft foot rolls on a smaller ρ the more it carries: two that carry a trot sink in twice as far as
+four that stand, and a ρ of standing tells up to 2 % more than the speed of heavy robots.
 
 The ground is a least-squares plane through the newest foothold of every leg, followed slowly
 (Gehring et al., "Dynamic trotting on slopes for quadrupedal robots", IROS 2015). Footholds are
@@ -19,12 +21,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, exp, hypot, sin
+from math import cos, exp, hypot, isfinite, sin
 from typing import NamedTuple
 
 import numpy as np
 
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.gait.contact_feedback import quarter_weight
+from dmp_cpg_ros.core.maths import Array, clamped
 from dmp_cpg_ros.core.maths.rotations import turned
 from dmp_cpg_ros.core.maths.vec3 import (
     Matrix,
@@ -74,9 +77,12 @@ class LegOdometry:
         self.legs = legs or RobotLegs(description)
         self._signs = [triple(leg.axis_sign.tolist()) for leg in description.legs]
         self._radius = [leg.foot_radius for leg in description.legs]
+        self._rolling = [leg.rolling_radius for leg in description.legs]
+        self._quarter_weight = quarter_weight(description)
+        self._soft = any(self._rolling)
 
-    def motion(self, q: Sequence[float], q_dot: Sequence[float], normal_in_base: Triple
-               ) -> FootMotion:
+    def motion(self, q: Sequence[float], q_dot: Sequence[float], normal_in_base: Triple,
+               force: Sequence[float] | None = None) -> FootMotion:
         """Contact points and measured velocities of all feet.
 
         Parameters
@@ -85,6 +91,8 @@ class LegOdometry:
             Joint angles [rad] and velocities [rad/s].
         normal_in_base : tuple of float
             Normal n of the ground, upwards.
+        force : sequence of four floats, optional
+            Normal forces on the feet [N]; a quarter of the weight where they are not known.
 
         Returns
         -------
@@ -92,14 +100,27 @@ class LegOdometry:
         """
         n_x, n_y, n_z = normal_in_base
         contacts, velocities, jacobians = [], [], []
+        radii = self._rolling_on(force) if self._soft else self._radius
         for i, ((place, J), sign, radius) in enumerate(
-                zip(self.legs.at(q), self._signs, self._radius, strict=True)):
+                zip(self.legs.at(q), self._signs, radii, strict=True)):
             angles, rates = q[3 * i : 3 * i + 3], triple(q_dot[3 * i : 3 * i + 3])
             down = (radius * n_x, radius * n_y, radius * n_z)
             contacts.append(minus(place, down))
             velocities.append(minus(cross(shank_rate(sign, angles, rates), down), times(J, rates)))
             jacobians.append(J)
         return FootMotion(tuple(contacts), tuple(velocities), tuple(jacobians))
+
+    def _rolling_on(self, force: Sequence[float] | None) -> list[float]:
+        """ρ of the feet under what they carry [m]."""
+        radii, full = [], 4.0 * self._quarter_weight
+        for i, (radius, rolling) in enumerate(zip(self._radius, self._rolling, strict=True)):
+            if rolling is not None:
+                carried = self._quarter_weight if force is None or not isfinite(force[i]) else (
+                    clamped(force[i], 0.0, full))
+                radius = max(0.0, rolling[0] + (rolling[1] - rolling[0])
+                             * (carried / self._quarter_weight - 1.0))
+            radii.append(radius)
+        return radii
 
 
 def shank_rate(sign: Sequence[float], angle: Sequence[float], rate: Sequence[float]) -> Triple:

@@ -41,6 +41,9 @@ class LegGeometry:
     foot_radius : float
         Distance from the centre of the contact sphere to where it touches the ground while the
         robot stands: its radius, less the compression of soft feet [m].
+    rolling_radius : tuple of float, optional
+        The same in the mean over a stance, with a quarter and with half of the weight on the foot
+        [m]; None where it is the same.
     damping : ndarray (3,)
         Viscous friction of the joints, which their drives may make up for [N m s/rad].
     swing_inertia : float
@@ -63,6 +66,12 @@ class LegGeometry:
     foot_radius: float
     damping: Array = field(default_factory=lambda: np.zeros(3))
     swing_inertia: float = 0.0
+    rolling_radius: tuple[float, float] | None = None
+
+    @property
+    def walking_radius(self) -> float:
+        """Radius on which the foot rolls under half of the weight, as in most gaits [m]."""
+        return self.foot_radius if self.rolling_radius is None else self.rolling_radius[1]
 
 
 @dataclass(frozen=True)

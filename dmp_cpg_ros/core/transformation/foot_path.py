@@ -213,8 +213,8 @@ def rolling_share(kinematics: LegKinematics, foothold_in_base: Array) -> tuple[f
     pitch_per_x = turning[1, 0] + turning[2, 0]
     roll_per_y = turning[0, 1]
     return (
-        float(1.0 / (1.0 - geometry.foot_radius * pitch_per_x)),
-        float(1.0 / (1.0 + geometry.foot_radius * roll_per_y)))
+        float(1.0 / (1.0 - geometry.walking_radius * pitch_per_x)),
+        float(1.0 / (1.0 + geometry.walking_radius * roll_per_y)))
 
 
 def _hermite(s: float, p0: float, p1: float, m0: float, m1: float) -> tuple[float, float]:

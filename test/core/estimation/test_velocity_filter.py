@@ -26,8 +26,9 @@ from dmp_cpg_ros.core.estimation.velocity_filter import (
     transition,
     update,
 )
+from dmp_cpg_ros.core.gait.contact_feedback import quarter_weight
 from dmp_cpg_ros.core.maths.rotations import levelled, roll_pitch_yaw, turned
-from dmp_cpg_ros.core.maths.vec3 import rotation, triple
+from dmp_cpg_ros.core.maths.vec3 import Triple, rotation, triple
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 
 NOISE = EstimationParameters()
@@ -239,6 +240,27 @@ def test_a_rolling_foot_measures_the_whole_speed() -> None:
     np.testing.assert_allclose(
         motion.contact_in_base[0], leg.foot_in_base(q) - (0.0, 0.0, radius), atol=1e-12)
     assert abs((leg.jacobian_in_base(q) @ q_dot)[0]) < 0.97 * 0.7  # what rolling leaves out
+
+
+def test_a_soft_foot_rolls_on_the_radius_of_its_load() -> None:
+    robot = quadruped()
+    soft = dataclasses.replace(robot, legs=tuple(
+        dataclasses.replace(leg, rolling_radius=(0.02, 0.014)) for leg in robot.legs))
+    q, q_dot, level = np.tile((0.0, 0.8, -1.5), 4), np.tile((0.0, 2.0, 1.0), 4), (0.0, 0.0, 1.0)
+    quarter = quarter_weight(robot)
+
+    def measured(radius: float) -> tuple[Triple, ...]:
+        hard = dataclasses.replace(robot, legs=tuple(
+            dataclasses.replace(leg, foot_radius=radius) for leg in robot.legs))
+        return LegOdometry(hard).motion(q.tolist(), q_dot.tolist(), level).velocity_in_base
+
+    odometry = LegOdometry(soft)
+    for force, radius in ((quarter, 0.02), (1.5 * quarter, 0.017), (2.0 * quarter, 0.014),
+                          (float('nan'), 0.02), (-1e9, 0.026), (1e9, 0.002)):
+        of_force = odometry.motion(q.tolist(), q_dot.tolist(), level, [force] * 4)
+        np.testing.assert_allclose(of_force.velocity_in_base, measured(radius), atol=1e-12)
+    known = LegOdometry(robot).motion(q.tolist(), q_dot.tolist(), level, [2.0 * quarter] * 4)
+    assert known == LegOdometry(robot).motion(q.tolist(), q_dot.tolist(), level)
 
 
 def test_a_plane_is_fitted_through_footholds() -> None:
