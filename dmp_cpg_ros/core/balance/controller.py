@@ -194,7 +194,7 @@ class PostureController:
         velocity = vec3.times(R_ground_base, vec3.triple(state.base_velocity_in_base.tolist()))
         rate = vec3.times(R_ground_base, vec3.triple(state.base_rate_in_base.tolist()))
         plan, integral, offset = self._slow_loops(
-            memory, stride, R_ground_base, state.base_quaternion, velocity, dt)
+            memory, stride, gait, R_ground_base, state.base_quaternion, velocity, dt)
         correction = integral.acting(p, leg_length, stride.moving)
         planned = vec3.plus(stride.reference, correction)
         sway = self._sway(stride)
@@ -237,22 +237,22 @@ class PostureController:
         return Stride(reference, omega, own_omegas, duty, positions, activity,
                       sum(swings) / len(swings), load)
 
-    def _slow_loops(self, memory: PostureState, stride: Stride, R_ground_base: Matrix,
-                    quaternion: Array, velocity: Triple, dt: float
+    def _slow_loops(self, memory: PostureState, stride: Stride, gait: GaitInForce,
+                    R_ground_base: Matrix, quaternion: Array, velocity: Triple, dt: float
                     ) -> tuple[MotionPlan, VelocityCorrection, MassOffset]:
         """Plan of the body's motion, and what is learned of its errors."""
         p, leg_length, moving = self.parameters, self.scale.leg_length, stride.moving
         plan = memory.plan.followed(stride.reference, moving, self.model.push_rate(p),
                                     p.friction * GRAVITY, dt)
         integral = memory.integral.integrated(
-            p, leg_length, moving, quaternion.tolist(), velocity, plan, stride.reference[2], dt)
+            p, leg_length, moving, quaternion.tolist(), velocity, plan, stride.reference[2], dt,
+            gait.room(stride.reference, self.scale))
         return plan, integral, memory.offset.found(p, leg_length, moving, R_ground_base, dt)
 
     def _beside(self, under: Pair, plan: MotionPlan, offset: MassOffset) -> Pair:
         """How far from their footholds a slope, a curve and an offset have the feet [m]."""
-        lean_x, lean_y = under
+        (lean_x, lean_y), (aside_x, aside_y) = under, offset.place
         slope_lean, outside = self.parameters.slope_lean, -self.model.height / GRAVITY
-        aside_x, aside_y = offset.place
         return (slope_lean * lean_x + outside * plan.curve[0] + aside_x,
                 slope_lean * lean_y + outside * plan.curve[1] + aside_y)
 

@@ -4,13 +4,15 @@
 
 Their errors are means over cycles. A velocity that stays behind while the reference stands still
 tells of payload or friction, which last; while it moves it tells of the way there, for which less
-is corrected. A tilt that stays tells of a centre of mass beside where the model has it.
+is corrected. With the correction legs go no faster than the gait may: in a pronk, whose feet push
+all at once, faster ones pitch the body more and bring it no farther. A tilt that stays tells of a
+centre of mass beside where the model has it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, exp, hypot, isnan, pi
+from math import atan2, exp, hypot, inf, isnan, pi
 from typing import NamedTuple
 
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
@@ -64,7 +66,7 @@ class VelocityCorrection(NamedTuple):
 
     def integrated(self, p: PostureParameters, leg_length: float, moving: float,
                    quaternion: Sequence[float], velocity: Triple, plan: MotionPlan, gamma: float,
-                   dt: float) -> VelocityCorrection:
+                   dt: float, room: float = inf) -> VelocityCorrection:
         """Integrate the errors of velocity and heading while the legs move; forget them at rest.
 
         Parameters
@@ -85,6 +87,8 @@ class VelocityCorrection(NamedTuple):
             Reference of the turn rate [rad/s].
         dt : float
             [s]
+        room : float
+            By how much the legs may go faster than they are asked [m/s].
         """
         x, y, z, w = quaternion
         yaw = atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
@@ -101,6 +105,8 @@ class VelocityCorrection(NamedTuple):
         (along, across), (should_along, should_across) = self.correction, wanted
         along = clamped(along + gain * (should_along - velocity[0]), -limit, limit) * kept
         across = clamped(across + gain * (should_across - velocity[1]), -limit, limit) * kept
+        along, across = _no_faster(along, should_along, room), _no_faster(
+            across, should_across, room)
         turn = 0.0 if isnan(self.yaw) else (yaw - self.yaw + pi) % (2.0 * pi) - pi
         error = (self.heading_error + gamma * dt - turn) * left
         return VelocityCorrection(
@@ -152,6 +158,13 @@ class MassOffset(NamedTuple):
         return MassOffset((roll, pitch), (
             clamped(x + speed * _beyond(pitch), -limit, limit),
             clamped(y - speed * _beyond(roll), -limit, limit)))
+
+
+def _no_faster(correction: float, velocity: float, room: float) -> float:
+    """Correction that adds a room to the size of a velocity at most [m/s]."""
+    if velocity == 0.0:
+        return correction
+    return min(correction, room) if velocity > 0.0 else max(correction, -room)
 
 
 def _beyond(tilt: float) -> float:

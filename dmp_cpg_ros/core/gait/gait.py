@@ -142,6 +142,10 @@ class CycleOfLegs(ABC):
                      + (1.0 - self.wide) * (ONE_SIDED_WEIGHT - 1.0))
         return scale.foot_speed(*velocity, self.apart, backwards)
 
+    def room(self, velocity: Triple, scale: BodyScale) -> float:
+        """Foot speed that a velocity leaves up to the highest one [m/s]."""
+        return max(0.0, scale.speed(self.highest(scale)) - self.limiting_speed(velocity, scale))
+
     def limited(self, velocity: Triple, scale: BodyScale, largest_curve: float = inf) -> Triple:
         """Velocity (v_x, v_y [m/s], γ [rad/s]) within the highest speed and the largest curve, as
         a share of g, that goes with it: :mod:`~dmp_cpg_ros.core.gait.speed_limit`.

@@ -276,6 +276,21 @@ def test_more_is_corrected_while_the_reference_stands_still() -> None:
     assert np.abs(np.diff(back)).max() < 0.03 * wide
 
 
+@pytest.mark.parametrize('way', [1.0, -1.0])
+def test_legs_go_no_faster_for_a_body_that_stays_behind_than_the_gait_may(way: float) -> None:
+    p, length, room = PostureParameters(), 0.28, 0.05
+    plan, loop = MotionPlan(expected=(way * 1.5, 0.0)), VelocityCorrection()
+    for _ in range(2000):
+        loop = loop.integrated(p, length, 1.0, (0.0, 0.0, 0.0, 1.0), (way, 0.1, 0.0), plan, 0.0,
+                               TICK, room)
+    assert loop.correction[0] == pytest.approx(way * room)
+    assert loop.correction[1] < -0.1  # nothing is asked across: what drifts is held all the same
+    for _ in range(500):
+        loop = loop.integrated(p, length, 1.0, (0.0, 0.0, 0.0, 1.0), (2.0 * way, 0.1, 0.0), plan,
+                               0.0, TICK, room)
+    assert way * loop.correction[0] < -0.1  # and slower ones are
+
+
 @pytest.mark.parametrize('moving', [0.98, 0.9])
 def test_slow_loops_forget_with_time_and_not_with_ticks(moving: float) -> None:
     """What legs that hardly move forget does not depend on the rate of the controller."""
