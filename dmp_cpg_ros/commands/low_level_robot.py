@@ -47,6 +47,7 @@ from dmp_cpg_ros.nodes.messages.interfaces import (
     COMMAND_INTERFACES,
     IMU_BROADCASTER,
     JOINT_BROADCASTER,
+    POWER,
     commands_of,
     foot_wrench,
     interface,
@@ -301,9 +302,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(options: argparse.Namespace, words: Sequence[str]) -> int:
     robot = options.robot and find_config(options.robot, ROBOTS)
     topics_of = tuple(options.interfaces.split(',')) if options.interfaces else COMMAND_INTERFACES
-    if unknown := set(topics_of) - set(COMMAND_INTERFACES):
+    valid = (*COMMAND_INTERFACES, POWER)
+    if unknown := set(topics_of) - set(valid):
         raise ParameterError(f"there is no interface '{min(unknown)}'; valid are "
-                             f'{", ".join(COMMAND_INTERFACES)}')
+                             f'{", ".join(valid)}')
     low_level = LowLevelRobot(robot, topics_of, round(options.timeout * 1e9), options.start)
     start_ros([NAME, *words])
     node = Node(NAME, enable_rosout=False, start_parameter_services=False)
@@ -344,8 +346,8 @@ def _parser() -> argparse.ArgumentParser:
         'it. --ros-args are taken as by every node.')
     add = parser.add_argument
     add('--robot', metavar='FILE', help='robot file (default: mini_quadruped.yaml)')
-    add('--interfaces', metavar='A,B', help='command interfaces that have a controller (default: '
-        f'{",".join(COMMAND_INTERFACES)})')
+    add('--interfaces', metavar='A,B', help='command interfaces that have a controller, '
+        f'{POWER} among them if there is one (default: {",".join(COMMAND_INTERFACES)})')
     add('--start', choices=('lying', 'standing', 'fallen'), default='lying',
         help='default: lying')
     add('--no-effort', action='store_true', help='motors that do not measure their torques')

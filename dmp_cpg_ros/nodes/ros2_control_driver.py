@@ -32,6 +32,7 @@ from dmp_cpg_ros.nodes.messages.interfaces import (
     COMMAND_INTERFACES,
     IMU_BROADCASTER,
     JOINT_BROADCASTER,
+    POWER,
     commands_of,
     foot_wrench,
 )
@@ -63,8 +64,9 @@ class DriverParameters(Parameters):
     command_interfaces: tuple[str, ...] = parameter(
         ('position',), 'command interfaces of the joints, each once and with a '
         'forward_command_controller; one of them is position, or effort, which without position '
-        'is the torque of the whole drive law; kp and kd are beside position only',
-        choices=COMMAND_INTERFACES)
+        'is the torque of the whole drive law; kp and kd are beside position only; power, 1 or 0, '
+        'takes that of drives which do anything',
+        choices=(*COMMAND_INTERFACES, POWER))
     publish_clock: bool = parameter(True, 'whether to publish /clock, by which silence is noticed')
 
     def __post_init__(self) -> None:
@@ -129,6 +131,11 @@ class Ros2ControlDriver(DrivenRobot):
     def keeps_velocity(self) -> bool:
         """Whether motors take a velocity beside the angle, with each command."""
         return {'position', 'velocity'} <= set(self._joint_publishers)
+
+    @property
+    def cuts_power(self) -> bool:
+        """Whether drives have an interface for that: what they are told else they may not do."""
+        return POWER in self._joint_publishers
 
     @property
     def acts_late_ns(self) -> int:
@@ -220,6 +227,8 @@ class Ros2ControlDriver(DrivenRobot):
             self._drive.accept(JointTargets(
                 *(values[name] for name in ('position', 'velocity', 'effort'))))
             values['effort'] = self._drive.torque(0, state.joint_position, state.joint_velocity)
+        lame = self._guard.drives.lame
+        values[POWER] = np.repeat([float(leg not in lame) for leg in LEGS], 3)
         for name, publisher in self._joint_publishers.items():
             # An array of its type is taken as it is; of a list, every entry is looked at.
             publisher.publish(Float64MultiArray(data=array('d', values[name].tobytes())))

@@ -61,6 +61,9 @@ class MotorCommand:
 COMMANDED = tuple(field.name for field in fields(MotorCommand))
 """What a motor can be told."""
 
+POWER = 'power'
+"""What its supply can be told besides: 1 or 0."""
+
 
 class LowLevelRobot:
     """Motors and body; its time goes on when it is told.
@@ -70,8 +73,8 @@ class LowLevelRobot:
     robot_file : RobotFile, Path, str or None
         The robot; None is the package's own.
     interfaces : sequence of str
-        Of ``COMMANDED``, those that are commanded. Gains that are not are the robot file's where
-        positions are commanded, and 0 where they are not.
+        Of ``COMMANDED`` and ``POWER``, those that are commanded. Gains that are not are the robot
+        file's where positions are commanded, and 0 where they are not; all motors have power.
     timeout_ns : int
         Silence of one of them after which the motors are damped [ns].
     start_pose : str
@@ -106,7 +109,7 @@ class LowLevelRobot:
         nothing = np.zeros(12)
         self._damping = own['kd']
         self.command = {name: own[name] if name in own and 'position' in interfaces else nothing
-                        for name in COMMANDED}
+                        for name in COMMANDED} | {POWER: np.ones(12)}
         self._timeout_ns, self._told_ns = timeout_ns, dict.fromkeys(interfaces, -1)
         self.state, self.timeouts, self._was_damped = self.robot.reset(), 0, True
 
@@ -134,6 +137,8 @@ class LowLevelRobot:
             raise DataError(f'{name} must be finite and at most {LARGEST:g}')
         if name in ('kp', 'kd') and (told < 0.0).any():
             raise DataError(f'{name} must not be negative')
+        if name == POWER and not np.isin(told, (0.0, 1.0)).all():
+            raise DataError(f'{name} must be 0 or 1')
         self.command[name] = told
         self._told_ns[name] = self.state.time_ns
 
@@ -148,8 +153,9 @@ class LowLevelRobot:
         damped = self.damped
         self.timeouts += damped and not self._was_damped
         self._was_damped = damped
-        told, nothing = MotorCommand(**self.command), np.zeros(12)
+        told = MotorCommand(**{name: self.command[name] for name in COMMANDED})
+        power, nothing = self.command[POWER], np.zeros(12)
         for _ in range(PERIOD_NS // MOTOR_NS):
             q, q_dot = self.state.joint_position, self.state.joint_velocity
             torque = -self._damping * q_dot if damped else told.torque(q, q_dot)
-            self.state = self.robot.step(JointTargets(nothing, nothing, torque))
+            self.state = self.robot.step(JointTargets(nothing, nothing, power * torque))

@@ -31,7 +31,13 @@ from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.core.scenario.fault import Fault
 from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS, Event, Scenario
 from dmp_cpg_ros.nodes.framework.parameters import FOREIGN_PREFIXES
-from dmp_cpg_ros.nodes.messages.interfaces import COMMAND_INTERFACES, SERVICES, TOPICS, Interface
+from dmp_cpg_ros.nodes.messages.interfaces import (
+    COMMAND_INTERFACES,
+    POWER,
+    SERVICES,
+    TOPICS,
+    Interface,
+)
 from dmp_cpg_ros.primitive_files import load_primitive, save_primitive
 from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file
 from dmp_cpg_ros.suite_table import DRIVER, KINDS, RECORDER, VISUALIZATION
@@ -69,7 +75,7 @@ def suite(shared_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Itera
     with composed_suite(shared_domain, folder, **ALL_OF_IT) as started:
         started.node(RECORDER, output=str(folder / 'bag'))
         started.node(VISUALIZATION)
-        started.node(DRIVER, command_interfaces=list(COMMAND_INTERFACES))
+        started.node(DRIVER, command_interfaces=[*COMMAND_INTERFACES, POWER])
         yield started
 
 

@@ -24,6 +24,7 @@ from dmp_cpg_ros.commands.low_level_robot import LowLevelTopics
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.modes.motion_library import lying_posture
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS
+from dmp_cpg_ros.nodes.messages.interfaces import COMMAND_INTERFACES, POWER
 from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp
 from dmp_cpg_ros.nodes.ros2_control_driver import DriverParameters, Ros2ControlDriver
 from dmp_cpg_ros.robot.low_level import LowLevelRobot
@@ -120,14 +121,14 @@ def test_joint_states_that_have_fallen_silent_do_not_enable(ros: Ros) -> None:
 
 @pytest.mark.parametrize('given', [
     'position', 'effort', 'velocity effort', 'position velocity', 'position kp kd',
-    'kd position velocity effort kp'])
+    'kd position velocity effort kp', 'effort power'])
 def test_interfaces_that_close_a_loop_are_taken(given: str) -> None:
     assert DriverParameters(command_interfaces=tuple(given.split())).command_interfaces
 
 
 @pytest.mark.parametrize('given', [
-    '', 'velocity', 'kp kd', 'velocity kp kd', 'effort kp kd', 'velocity effort kd',
-    'position position', 'effort velocity effort'])
+    '', 'velocity', 'power', 'velocity power', 'kp kd', 'velocity kp kd', 'effort kp kd',
+    'velocity effort kd', 'position position', 'effort velocity effort'])
 def test_interfaces_that_close_no_loop_or_come_twice_are_refused(ros: Ros, given: str) -> None:
     with pytest.raises(ParameterError, match='each once, position or effort'):
         Ros2ControlDriver(context=ros.context, parameter_overrides=[
@@ -144,6 +145,30 @@ def test_torques_alone_bring_the_robot_to_its_belly_and_keep_their_limits(ros: R
         assert np.abs(away).max() < 0.15
         limit = np.concatenate([leg.torque_limit for leg in description.legs])
         assert (np.abs(made.robot.command['effort']) <= limit).all()
+
+
+def test_drives_of_a_lame_leg_lose_their_power_where_they_have_an_interface_for_it(
+        ros: Ros) -> None:
+    """As long as the leg is lame: the others go on, and it gives no torque whatever it is told."""
+    with bench(ros, *COMMAND_INTERFACES, POWER) as made:
+        made.told()
+        assert made.enable().success
+        made.run(10)
+        drives, front_right = made.driver._guard.drives, slice(3, 6)
+        assert drives.cuts and made.robot.command[POWER].all()
+        assert np.abs(made.robot.state.joint_effort[front_right]).max() > 0.0
+        drives.lame = ('fr',)
+        drives._lame_ns = np.where(np.array(LEGS) == 'fr', made.robot.state.time_ns, -10**10)
+        made.run(5)
+        power = made.robot.command[POWER].reshape(4, 3)
+        assert not power[1].any() and power[[0, 2, 3]].all()
+        assert not made.robot.state.joint_effort[front_right].any()
+        assert np.abs(made.robot.state.joint_effort[6:]).max() > 0.0
+        drives.lame = ()
+        made.run(5)
+        assert made.robot.command[POWER].all()
+    with bench(ros, *COMMAND_INTERFACES) as made:
+        assert not made.driver._guard.drives.cuts  # a wild leg is not lain down with
 
 
 def test_the_legs_are_followed_within_limits_when_they_rest_where_the_joints_are(ros: Ros) -> None:

@@ -26,7 +26,7 @@ from rclpy.qos import QoSProfile
 from ros_processes import Processes, Ros
 from test_readme import DOCUMENTS, blocks, text
 
-from dmp_cpg_ros.nodes.messages.interfaces import COMMAND_INTERFACES
+from dmp_cpg_ros.nodes.messages.interfaces import COMMAND_INTERFACES, POWER
 from dmp_cpg_ros.suite_table import DRIVER
 
 shared_domain, shared_suite, ros = (
@@ -69,7 +69,7 @@ def filled(message: Any, values: dict[str, Any]) -> Any:
 
 @pytest.fixture(scope='module')
 def suite(shared_suite: Processes) -> Processes:
-    shared_suite.node(DRIVER, command_interfaces=list(COMMAND_INTERFACES))
+    shared_suite.node(DRIVER, command_interfaces=[*COMMAND_INTERFACES, POWER])
     return shared_suite
 
 

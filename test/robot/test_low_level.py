@@ -17,6 +17,7 @@ from dmp_cpg_ros.robot.drive_watch import DriveWatch
 from dmp_cpg_ros.robot.low_level import (
     COMMANDED,
     PERIOD_NS,
+    POWER,
     LowLevelRobot,
     MotorCommand,
 )
@@ -43,9 +44,9 @@ def test_the_law_of_a_motor_is_the_one_that_is_documented() -> None:
 
 def test_the_interfaces_are_those_that_the_driver_commands() -> None:
     pytest.importorskip('rclpy')
-    from dmp_cpg_ros.nodes.messages.interfaces import COMMAND_INTERFACES
+    from dmp_cpg_ros.nodes.messages import interfaces
 
-    assert COMMANDED == COMMAND_INTERFACES
+    assert (COMMANDED, POWER) == (interfaces.COMMAND_INTERFACES, interfaces.POWER)
 
 
 def test_nothing_moves_it_until_every_interface_has_been_commanded() -> None:

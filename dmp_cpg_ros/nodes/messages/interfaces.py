@@ -62,6 +62,9 @@ JOINT_BROADCASTER, IMU_BROADCASTER = 'joint_state_broadcaster', 'imu_sensor_broa
 COMMAND_INTERFACES = ('position', 'velocity', 'effort', 'kp', 'kd')
 """Command interfaces of joints that the driver can write, in the terms of ros2_control."""
 
+POWER = 'power'
+"""One more, of drives whose power can be taken: 1 where a drive has power, 0 where it has none."""
+
 
 def foot_wrench(leg: str) -> str:
     """Topic of the force_torque_sensor_broadcaster of a foot."""
@@ -271,7 +274,7 @@ TOPICS: tuple[Interface, ...] = (
     *(Interface(commands_of(name), Float64MultiArray,
                 f'{name} of the twelve joints in the order of the robot file, once enabled',
                 (DRIVER,), ('user',), sometimes=(DRIVER,), recorded=False)
-      for name in COMMAND_INTERFACES),
+      for name in (*COMMAND_INTERFACES, POWER)),
 )
 """Topics of the suite."""
 
