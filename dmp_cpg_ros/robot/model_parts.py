@@ -257,9 +257,9 @@ def as_slice(places: NDArray[np.integer[Any]]) -> Places:
 
 
 class JointActuators:
-    """Applies torques to twelve joints.
+    """Where the torques of twelve joints go.
 
-    When every joint has a plain motor the motors get the torques. Otherwise all torques are
+    When every joint has a plain motor the motors get them. Otherwise all torques are
     applied to the joints themselves, and the model's own actuators of these joints (position
     servos, say) are switched off in ``model``.
     """
@@ -272,15 +272,15 @@ class JointActuators:
         if self._through_motors:
             self._index, self._per_torque = as_slice(np.array(actuators)), 1.0 / ratios
             return
-        self._index = as_slice(model.jnt_dofadr[joints])
+        self._index, self._per_torque = as_slice(model.jnt_dofadr[joints]), np.ones(len(joints))
         model.actuator_gainprm[actuators] = model.actuator_biasprm[actuators] = 0.0
 
-    def apply(self, data: mujoco.MjData, torque: Array) -> None:
-        """Set the torques (12,) [N m] of the coming physics step."""
-        if self._through_motors:
-            data.ctrl[self._index] = torque * self._per_torque
-        else:
-            data.qfrc_applied[self._index] = torque
+    def inputs(self, data: mujoco.MjData) -> tuple[Array, Places, Array]:
+        """Where the torques (12,) [N m] of the coming physics step go: an array of the data, their
+        places in it, and what is put there per torque.
+        """
+        return (data.ctrl if self._through_motors else data.qfrc_applied), self._index, (
+            self._per_torque)
 
 
 def differ(model: mujoco.MjModel, ids: ModelIds, dof: Places, mismatch: MismatchParameters,

@@ -169,11 +169,17 @@ class MujocoRobot:
         else:
             self._start = start_pose_of(start_pose, self.description, seed)
         self.data = mujoco.MjData(model)
-        self._damping, self._friction = (of[self._dof] for of in (
-            model.dof_damping, model.dof_frictionloss))
-        self._torques = np.zeros((self._steps, 12))  # of each physics step of the tick
-        self._rotations = np.zeros((self._steps, 3, 3))  # of the base at the begin of each
-        self._velocities = np.zeros((self._steps + 1, model.nv))  # before each, after the last
+        # Whole arrays for all physics steps of a tick: NumPy takes five times as long for
+        # operands of different shapes, and for parts of rows.
+        steps = self._steps
+        self._damping, self._friction, self._gravity_of_steps, self._nothing = (
+            np.tile(of, (steps, 1)) for of in (
+                model.dof_damping[self._dof], model.dof_frictionloss[self._dof], self._gravity,
+                np.zeros(12)))
+        self._torques = np.zeros((steps, 12))
+        self._rotations = np.zeros((steps, 3, 3))  # of the base at the begin of each
+        self._rates = np.zeros((steps + 1, 12))  # of the joints before each, after the last
+        self._velocities = np.zeros((steps + 1, 3))  # of the base, likewise
         self.reset()
 
     def reset(self, time_ns: int = 0) -> RobotState:
@@ -203,7 +209,8 @@ class MujocoRobot:
             holding = model_parts.standing_torque(model, data, self._ids, self._dof)
             self._effort = self._strength * self._drive.limited(holding, np.zeros(12))
             self._peak_effort = np.abs(self._effort)
-            self._actuators.apply(data, self._effort)
+            inputs, where, per_torque = self._actuators.inputs(data)
+            inputs[where] = self._effort * per_torque
             mujoco.mj_forward(model, data)
             # As held at rest: the first instant of the contacts is nothing a sensor would show.
             self._specific_force = -self._gravity @ data.xmat[self.base].reshape(3, 3)
@@ -222,22 +229,26 @@ class MujocoRobot:
         """
         self._drive.accept(targets)
         self._begin_push()
-        model, data, drive, strength = self.model, self.data, self._drive, self._strength
+        model, data, torque, strength = self.model, self.data, self._drive.torque, self._strength
         if self.without_power:
             strength = strength * [leg not in self.without_power for leg in np.repeat(LEGS, 3)]
-        qpos, qvel, step, dof = data.qpos, data.qvel, mujoco.mj_step, self._dof
-        R_world_base = data.xmat[self.base].reshape(3, 3)  # a view, of the step's begin
-        torques, velocities, rotations = self._torques, self._velocities, self._rotations
+        # views, asked for once: each look at MuJoCo's data costs as much as a call
+        qpos, qvel, step, q, dof = data.qpos, data.qvel, mujoco.mj_step, self._qpos, self._dof
+        velocity = qvel[self._ids.base_dof:self._ids.base_dof + 3]
+        R_world_base = data.xmat[self.base].reshape(3, 3)  # of the step's begin
+        inputs, where, per_torque = self._actuators.inputs(data)
+        torques, rates, velocities = self._torques, self._rates, self._velocities
         for i in range(self._steps):
-            velocity = velocities[i]
-            velocity[:] = qvel
-            torques[i] = self._effort = strength * drive.torque(
-                i, qpos[self._qpos], velocity[dof])
-            self._actuators.apply(data, self._effort)
-            self._push_on()
+            velocities[i] = velocity
+            rate, effort = rates[i], torques[i]
+            rate[:] = qvel[dof]
+            effort[:] = strength * torque(i, qpos[q], rate)
+            inputs[where] = effort * per_torque
+            if self._push_steps >= 0:
+                self._push_on()
             step(model, data)
-            rotations[i] = R_world_base
-        velocities[-1] = qvel
+            self._rotations[i] = R_world_base
+        self._effort, rates[-1], velocities[-1] = torques[-1].copy(), qvel[dof], velocity
         self._tick += 1
         if not isfinite(qpos.dot(qpos) + qvel.dot(qvel)):
             raise RobotError('the simulation became unstable in the tick that ends at '
@@ -246,22 +257,21 @@ class MujocoRobot:
         self._specific_force = self._mean_specific_force()
         # Over a physics step the torque is constant and the velocity changes evenly: with their
         # mean the work is what the step adds to the kinetic energy.
-        rates = velocities[:, dof]
         mean = 0.5 * (rates[1:] + rates[:-1])
-        power = np.maximum(torques * mean, 0.0).sum(axis=0)
+        power = np.add.reduce(np.maximum(torques * mean, self._nothing))
         self._work = self._work + power * self._step_s
-        lost = (self._damping * mean * mean + self._friction * np.abs(mean)).sum(axis=0)
+        lost = np.add.reduce(self._damping * mean * mean + self._friction * np.abs(mean))
         self._loss = self._loss + lost * self._step_s
-        self._peak_effort = np.abs(torques).max(axis=0)
+        self._peak_effort = np.maximum.reduce(np.abs(torques))
         return self._state()
 
     def _mean_specific_force(self) -> Array:
         """What an accelerometer in the base felt in the mean over the tick, (3,) [m/s^2]."""
-        d = self._ids.base_dof
-        velocity = self._velocities[:, d:d + 3]
-        felt = (velocity[1:] - velocity[:-1]) / self._step_s - self._gravity
+        velocity = self._velocities
+        felt = (velocity[1:] - velocity[:-1]) / self._step_s - self._gravity_of_steps
         in_base = felt[:, None, :] @ self._rotations  # (steps, 1, 3)
-        return np.asarray(in_base.sum(axis=0)[0] / self._steps)
+        mean: Array = np.add.reduce(in_base)[0] / self._steps
+        return mean
 
     def apply_push(self, force_in_world: Array, duration_ns: int) -> None:
         """Push the base's centre of mass with a force [N] from now on, for whole physics steps.
@@ -292,10 +302,9 @@ class MujocoRobot:
             self.apply_push(force.in_world(_xyzw(self._base_pose[3:])), steps * self._step_ns)
 
     def _push_on(self) -> None:
-        """Set the force of one physics step; after the last one it is zero."""
-        if self._push_steps >= 0:
-            self.data.xfrc_applied[self.base, :3] = self._push_force if self._push_steps else 0.0
-            self._push_steps -= 1
+        """Set the force of one physics step of a push; after the last one it is zero."""
+        self.data.xfrc_applied[self.base, :3] = self._push_force if self._push_steps else 0.0
+        self._push_steps -= 1
 
     @property
     def _base_pose(self) -> Array:
@@ -325,16 +334,16 @@ class MujocoRobot:
         return float(height_over_ground(self.world, place, hips))
 
     def _state(self) -> RobotState:
-        qvel, d, pose = self.data.qvel, self._ids.base_dof, self._base_pose
-        quaternion = _xyzw(pose[3:])
+        qpos, qvel, at, d = self.data.qpos, self.data.qvel, self._ids.base_qpos, self._ids.base_dof
+        w, x, y, z = qpos[at + 3:at + 7].tolist()
+        quaternion = (x, y, z, w)
         state = RobotState(
             time_ns=self._tick * self.tick_ns,
-            joint_position=self.data.qpos[self._qpos].copy(),
-            joint_velocity=qvel[self._dof].copy(), joint_effort=self._effort.copy(),
-            base_position_in_world=pose[:3].copy(), base_quaternion=quaternion,
-            base_velocity_in_base=qvel[d:d + 3].dot(np.array(rotation(quaternion.tolist()))),
-            base_rate_in_base=qvel[d + 3:d + 6].copy(),
-            acceleration_in_base=self._specific_force.copy(),
+            joint_position=qpos[self._qpos].copy(),
+            joint_velocity=qvel[self._dof].copy(), joint_effort=self._effort,
+            base_position_in_world=qpos[at:at + 3].copy(), base_quaternion=np.array(quaternion),
+            base_velocity_in_base=qvel[d:d + 3].dot(np.array(rotation(quaternion))),
+            base_rate_in_base=qvel[d + 3:d + 6].copy(), acceleration_in_base=self._specific_force,
             foot_force=self._contacts.foot_force(self.data),
             joint_work=self._work, joint_peak_effort=self._peak_effort, joint_loss=self._loss)
         return state if self._sensors is None else self._sensors.measured(state)
