@@ -90,7 +90,8 @@ class AndronovHopf:
         if x.dtype.kind == 'c':  # a step of a derivative: x₁ and x₂ are no parts of one number
             turning = np.asarray(omega)[..., None] * (x @ phase_generator().T)
             return np.asarray(turning + (at_origin - damping)[..., None] * x)
-        growth = np.asarray(at_origin - 1j * omega - damping)
+        growth = np.empty(damping.shape, complex)  # filled, for NumPy is slow where types mix
+        growth.real, growth.imag = at_origin - damping, 0.0 - omega
         return (growth[..., None] * np.ascontiguousarray(x, dtype=float).view(complex)).view(float)
 
     def jacobian(self, x: Array, omega: float | Array) -> Array:
