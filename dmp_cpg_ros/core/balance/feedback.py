@@ -13,12 +13,14 @@ from dmp_cpg_ros.core.balance.capture_point import WIDE
 from dmp_cpg_ros.core.balance.terrain import LEVEL_FEET
 from dmp_cpg_ros.core.inhibition.blocked import Progress
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.records import made_often
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.leg import LegFeedback
 
 FELT = (True,) * len(LEGS)
 
 
+@made_often
 @dataclass(frozen=True)
 class PostureFeedback:
     """What the posture controller sends to the legs.

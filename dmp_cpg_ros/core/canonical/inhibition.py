@@ -13,6 +13,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.records import made_often
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -79,6 +80,7 @@ class InhibitionParameters(Parameters):
         return np.where(np.arange(len(LEGS)) == leg, self.inhibition_gain, 0.0)
 
 
+@made_often
 @dataclass(frozen=True)
 class Inhibition:
     """The inhibition that acts on the canonical system during one tick.

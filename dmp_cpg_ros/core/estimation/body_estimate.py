@@ -10,6 +10,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.estimation.velocity_filter import GYRO_BIAS, TILT, VELOCITY
 from dmp_cpg_ros.core.maths import Array, vec3
+from dmp_cpg_ros.core.maths.records import made_often
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
@@ -21,6 +22,7 @@ at most; doc/architecture.md has the commands). Other robots and grounds may err
 """
 
 
+@made_often
 @dataclass(frozen=True)
 class BodyEstimate:
     """The body's state as far as the sensors tell it.

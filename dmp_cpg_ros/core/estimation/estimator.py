@@ -30,7 +30,7 @@ from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.estimation.velocity_filter import FilterState
 from dmp_cpg_ros.core.maths import Array, clamped, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.records import replace_unchecked
+from dmp_cpg_ros.core.maths.records import made_often, replace_unchecked
 from dmp_cpg_ros.core.maths.rotations import levelled
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
@@ -67,6 +67,7 @@ HEIGHT_RATE = 50.0
 """Rate at which the height follows the kinematics of the stance legs [1/s]."""
 
 
+@made_often
 @dataclass(frozen=True)
 class EstimatorState:
     """State of the estimator between ticks.

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.records import replace_unchecked
+from dmp_cpg_ros.core.maths.records import made_often, replace_unchecked
 from dmp_cpg_ros.core.maths.vec3 import minus, triple
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -99,6 +99,7 @@ NOBODY = Doubt((False,) * N, False, np.zeros(N), np.zeros(N, int), np.zeros(N, i
 """No leg is in doubt."""
 
 
+@made_often
 @dataclass(frozen=True)
 class SensorWatch:
     """Memory of the last readings.

@@ -28,6 +28,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.gait.contact_feedback import quarter_weight
 from dmp_cpg_ros.core.maths import Array, clamped
+from dmp_cpg_ros.core.maths.records import made_often
 from dmp_cpg_ros.core.maths.rotations import turned
 from dmp_cpg_ros.core.maths.vec3 import (
     Matrix,
@@ -198,6 +199,7 @@ NARROWEST = 1e-3
 """Spread of the footholds, squared, below which they tell no slope [m^2]."""
 
 
+@made_often
 @dataclass(frozen=True)
 class TerrainState:
     """Footholds and plane.

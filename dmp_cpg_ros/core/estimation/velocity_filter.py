@@ -33,7 +33,7 @@ import numpy as np
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.records import replace_unchecked
+from dmp_cpg_ros.core.maths.records import made_often, replace_unchecked
 from dmp_cpg_ros.core.maths.rotations import turned
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, cross, minus, moved, triple
 
@@ -56,6 +56,7 @@ _TRANSITION = (
 """Places in the transition's matrix of what is neither 0 nor 1, block by block."""
 
 
+@made_often
 @dataclass(frozen=True)
 class FilterState:
     """State of the filter.

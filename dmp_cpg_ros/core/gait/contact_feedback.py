@@ -39,6 +39,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.transition import BlendedGait
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.maths.records import made_often
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.sensor_readings import LARGEST_FORCE
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -70,6 +71,7 @@ class ContactLimits:
     after: float
 
 
+@made_often
 @dataclass(frozen=True)
 class ContactState:
     """Memory of the feedback.

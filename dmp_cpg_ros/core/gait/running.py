@@ -50,7 +50,7 @@ from dmp_cpg_ros.core.gait.transition import (
 )
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.records import replace_unchecked
+from dmp_cpg_ros.core.maths.records import made_often, replace_unchecked
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 
 
@@ -157,6 +157,7 @@ def approached(cadence_scale: float, wanted: float, dt: float) -> float:
     return cadence_scale + (most if wanted > cadence_scale else -most)
 
 
+@made_often
 @dataclass(frozen=True)
 class CanonicalState:
     """State of the canonical block after a tick.

@@ -1,12 +1,32 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``dataclasses.replace`` for what changes at every tick."""
+"""Frozen dataclasses that are made, or changed, at every tick, without what that costs."""
 
 from __future__ import annotations
 
+from copy import copy
+from dataclasses import fields, make_dataclass
 from typing import Any, TypeVar
 
 Record = TypeVar('Record')
+
+
+def made_often(cls: type[Record]) -> type[Record]:
+    """Frozen dataclass that is made at an eighth of the price: mypy refuses that it is changed, as
+    before, and nobody else does, for ``object.__setattr__`` takes 0.3 µs a field.
+
+    Parameters
+    ----------
+    cls : frozen dataclass
+        Without ``__slots__``.
+    """
+    members = [(field.name, field.type, copy(field)) for field in fields(cls)]  # type: ignore
+    post_init = {name: getattr(cls, name) for name in ('__post_init__',) if hasattr(cls, name)}
+    plain: Any = make_dataclass(cls.__name__, members, namespace=post_init)
+    for name, of in (('__init__', plain.__init__), ('__setattr__', object.__setattr__),
+                     ('__delattr__', object.__delattr__)):
+        setattr(cls, name, of)
+    return cls
 
 
 def replace_unchecked(record: Record, **values: Any) -> Record:

@@ -16,6 +16,7 @@ from dmp_cpg_ros.core.balance.controller import (
 )
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.records import made_often
 from dmp_cpg_ros.core.modes.manager import ModeManager, ModeParameters, ModeState
 from dmp_cpg_ros.core.modes.requests import ModeAnswer, request
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -23,6 +24,7 @@ from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
 
+@made_often
 @dataclass(frozen=True)
 class BodyState:
     """State of the posture block.

@@ -15,6 +15,7 @@ import numpy as np
 from dmp_cpg_ros.core.clock import carried
 from dmp_cpg_ros.core.maths import Array, clamped
 from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.maths.records import made_often
 from dmp_cpg_ros.core.maths.vec3 import dot, upward
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -30,6 +31,7 @@ CERTAIN_SUPPORT = 0.5
 """Share of the weight on the contact sensors from which the joint torques need not be asked."""
 
 
+@made_often
 @dataclass(frozen=True, eq=False)
 class BodyCondition:
     """Support state of the body at one tick.

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array, check_positive
 from dmp_cpg_ros.core.maths.exponential import exponential
+from dmp_cpg_ros.core.maths.records import made_often
 from dmp_cpg_ros.core.primitives.demonstration import columns
 from dmp_cpg_ros.core.primitives.time_scaling import Form, StepGrid
 
@@ -33,6 +34,7 @@ FORMS: tuple[Form, ...] = ('scaled', 'printed')
 """The readings of τ that are valid."""
 
 
+@made_often
 @dataclass(frozen=True, eq=False)
 class SpringState:
     """Positions y and velocities ẏ of n degrees of freedom, ndarray (n,) each."""

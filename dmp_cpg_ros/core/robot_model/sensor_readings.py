@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from dmp_cpg_ros.core.maths.records import made_often
 from dmp_cpg_ros.core.robot_model.state import LEGS, Array, RobotState
 
 FASTEST_TURN, HARDEST_BLOW = 100.0, 1000.0
@@ -20,6 +21,7 @@ ALL = (True,) * len(LEGS)
 """What is so of every leg."""
 
 
+@made_often
 @dataclass(frozen=True)
 class SensorReadings:
     """What the sensors of one tick say; NaN marks what is missing.

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from math import isnan
 
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.records import made_often
 
 LEGS = ('fl', 'fr', 'rl', 'rr')
 """Leg names in the order of every array over legs."""
@@ -19,6 +20,7 @@ JOINT_NAMES = tuple(f'{leg}_{joint}' for leg in LEGS for joint in JOINTS_OF_LEG)
 """The twelve joint names in the order of every array over joints."""
 
 
+@made_often
 @dataclass(frozen=True)
 class RobotState:
     """State of the robot at one tick.
@@ -87,6 +89,7 @@ class RobotState:
         return self.base_rate_in_base if self.gyro_in_base is None else self.gyro_in_base
 
 
+@made_often
 @dataclass(frozen=True)
 class JointTargets:
     """Targets for some joints; what a leg sends to the robot.

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.maths.records import made_often
 from dmp_cpg_ros.core.maths.rotations import turned
 from dmp_cpg_ros.core.maths.vec3 import rotation
 from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
@@ -41,6 +42,7 @@ LONGEST_GAP = 0.1
 """Longest time over which a turn rate is held [s]."""
 
 
+@made_often
 @dataclass(frozen=True)
 class VoteSensors:
     """Readings of contact sensors and IMU that votes are derived from; NaN where there is none.
