@@ -83,7 +83,7 @@ class _DelayedRun:
         self.steps = int(rest / self._step)
         self._walk_up_to_the_region(capture.omega / (1.0 + degree * ages * (kind == 'held')), rng)
         self._draw_ages(rng)
-        self._way = self._end_way = np.full(count, np.inf)
+        self._way = self._before = self._end_way = np.full(count, np.inf)
         self._from = self._end_from = self._z
         self._backwards = np.full(count, -len(self._past))
         self._inside = np.full(self._z.shape, -1)    # ticks since nodes came into C, or -1
@@ -184,7 +184,8 @@ class _DelayedRun:
         """Note how far nodes go in a run and in its last quarter; whether it is over."""
         now, last = tick % self.steps, 3 * self.steps // 4
         if now == 0:
-            self._before, self._way, self._from = self._way, np.zeros(len(self._way)), self._z
+            self._earlier, self._before = self._before, self._way
+            self._way, self._from = np.zeros(len(self._way)), self._z
         if now == last:
             self._end_way, self._end_from = np.zeros(len(self._way)), self._z
         np.maximum(self._way, np.abs(self._z - self._from).max(axis=1), out=self._way)
@@ -200,8 +201,10 @@ class _DelayedRun:
 
     @property
     def moves(self) -> NDArray[np.bool_]:
-        """Whether something has moved as far as in the run before, (count,)."""
-        return np.asarray(~self.rests & (self._way > 0.9 * self._before))
+        """Whether something has moved nearly as far as two runs before, (count,): with samples
+        that are old and chosen ill, captured legs come to rest, but slowly and not evenly.
+        """
+        return np.asarray(~self.rests & (self._way > 0.9 * self._earlier))
 
 
 def chosen_ages(away: Complex, past: Complex, now: int, most: NDArray[np.int_],

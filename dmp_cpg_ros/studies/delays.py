@@ -13,10 +13,10 @@ turn, or to 0.3 s.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -34,9 +34,11 @@ from dmp_cpg_ros.core.contraction import delays
 from dmp_cpg_ros.core.contraction.capture import capture_set, place_tolerance, radius_tolerance
 from dmp_cpg_ros.core.contraction.delays import Capture
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.studies.delayed_runs import PATTERNS, fails
 from dmp_cpg_ros.studies.draws import both_ways, random_edges
-from dmp_cpg_ros.studies.output import markdown_table
+from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
+from dmp_cpg_ros.studies.workers import Workers
 
 MARGINS: dict[str, Callable[[Capture], float]] = {
     'late': delays.late_margin, 'held': delays.held_margin, 'carried': delays.carried_margin}
@@ -63,14 +65,16 @@ class Row:
     kind, network : str
         Kind of delay, and what was captured.
     certified, fails : float
-        Age that is certified, and the smallest that fails [s]; infinite where none of ``AGES``
-        does.
+        Age that is certified, and the smallest that fails [s]; infinite where none does.
+    tried : float
+        Largest age that was tried [s].
     """
 
     kind: str
     network: str
     certified: float
     fails: float
+    tried: float
 
     @property
     def share(self) -> float:
@@ -80,34 +84,41 @@ class Row:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; returns 1 where something fails that is certified."""
-    parser = argparse.ArgumentParser(prog='delays', description=__doc__.splitlines()[0])
+    parser = parser_of('delays', __doc__.splitlines()[0], 'every row')
     parser.add_argument('--networks', type=int, default=100, metavar='N',
                         help='random networks beside the gaits (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=1, help='of the random networks')
     parser.add_argument('--kinds', nargs='+', choices=MARGINS, default=list(MARGINS))
     options = parser.parse_args(arguments)
-    rows = list(measured(options.networks, options.seed, options.kinds))
+    cases = [(options.seed, number, name, capture) for number, (name, capture) in enumerate(
+        [*gait_captures(), *random_captures(np.random.default_rng(options.seed),
+                                            options.networks)])]
+    with Workers(options.workers, options.cluster) as workers:
+        rows = [row for of in workers.map(partial(measured, tuple(options.kinds)), cases)
+                for row in of]
     table = []
     for kind, group in product(options.kinds, ('gait', 'random')):
         of = [row for row in rows if row.kind == kind and row.network.startswith(group)]
         shares = [row.share for row in of if row.certified > 0.0 and np.isfinite(row.fails)]
         told = [f'{share:.2f}' for share in np.quantile(shares, (0.0, 0.5, 1.0))
-                ] if shares else '---'
+                ] if shares else ['---'] * 3
         table.append((kind, f'{len(of)} {group}s', str(sum(row.certified == 0.0 for row in of)),
                       str(sum(np.isinf(row.fails) for row in of)), *told))
     print(markdown_table(COLUMNS, table))
+    write_results(options.json, [vars(row) for row in rows])
     return int(any(row.share > 1.0 for row in rows))
 
 
-def measured(networks: int, seed: int, kinds: Sequence[str] = tuple(MARGINS)) -> Iterator[Row]:
-    """All rows of some kinds: gaits first, then random networks."""
-    rng = np.random.default_rng(seed)
-    cases = [*gait_captures(), *random_captures(rng, networks)]
-    for name, capture in cases:
-        certified = {kind: MARGINS[kind](capture) for kind in kinds}
-        for kind in kinds:
-            yield Row(kind, name, certified[kind], failing_age(capture, kind, certified[kind], rng)
-                      if certified[kind] > 0.0 else np.inf)
+def measured(kinds: Sequence[str], case: tuple[int, int, str, Capture]) -> list[Row]:
+    """Rows of one network, drawn with a seed and its number."""
+    seed, number, name, capture = case
+    rng, rows = np.random.default_rng((seed, number)), []
+    for kind in kinds:
+        certified = MARGINS[kind](capture)
+        tried = ages_of(capture, kind, certified)
+        rows.append(Row(kind, name, certified, failing_age(capture, kind, tried, rng)
+                        if certified > 0.0 else np.inf, float(tried[-1])))
+    return rows
 
 
 def gait_captures() -> Iterator[tuple[str, Capture]]:
@@ -153,15 +164,18 @@ def capture_of(graph: CouplingGraph, rho: float, radius: float, omega: float, re
                    radius_tolerance(radius, region))
 
 
-def failing_age(capture: Capture, kind: str, certified: float, rng: np.random.Generator
-                ) -> float:
-    """Smallest age at which a pattern fails, of ``AGES`` times the certified one and then of some
-    between; but of samples up to a turn or ``MOST_AGE``, from 4 ms on where any is certified [s].
+def ages_of(capture: Capture, kind: str, certified: float) -> Array:
+    """Ages to try: ``AGES`` times the certified one; of samples up to a turn or ``MOST_AGE``, from
+    4 ms on where any is certified, ndarray [s].
     """
-    ages = np.asarray(certified * AGES, dtype=float)
-    if kind != 'late':
-        first, turn = 0.999 * certified if np.isfinite(certified) else 4e-3, 2.0 * np.pi
-        ages = np.geomspace(first, max(2.0 * first, min(turn / capture.omega, MOST_AGE)), 8)
+    if kind == 'late':
+        return np.asarray(certified * AGES)
+    first, turn = 0.999 * certified if np.isfinite(certified) else 4e-3, 2.0 * np.pi
+    return np.geomspace(first, max(2.0 * first, min(turn / capture.omega, MOST_AGE)), 8)
+
+
+def failing_age(capture: Capture, kind: str, ages: Array, rng: np.random.Generator) -> float:
+    """Smallest of some ages at which a pattern fails, and then of some between [s]."""
     patterns = ('one age', 'kept') if kind == 'late' else PATTERNS
     failed = {pattern: fails(capture, kind, ages, pattern, rng) for pattern in patterns}
     first = int(np.argmax(np.any(list(failed.values()), axis=0)))

@@ -413,6 +413,26 @@ def tightness_rows(rows: Any) -> list[str]:
             for name, condition in TIGHTNESS.items()]
 
 
+def delay_rows(rows: Any) -> list[str]:
+    """Rows of the table of delays: a kind, gaits or random networks, and what was certified of the
+    smallest age that fails; no number stands for any age, and for none.
+    """
+    told = []
+    for kind, name in (('late', 'late inhibition'), ('held', 'states held'),
+                       ('carried', 'states carried on')):
+        for group, networks in (('gait', 'gaits'), ('random', 'random networks')):
+            of = [row for row in rows
+                  if row['kind'] == kind and row['network'].startswith(group)]
+            any_age, none = (sum(row[what] is None for row in of)
+                             for what in ('certified', 'fails'))
+            shares = sorted(row['certified'] / row['fails'] for row in of if row['fails'])
+            assert all(row['certified'] is not None for row in of if row['fails']), kind
+            spread = ', '.join(f'{share:.2f}' for share in (
+                shares[0], median(shares), shares[-1])) if shares else 'none fails'
+            told.append(f'| {name} | {len(of)} {networks} | {any_age} | {none} | {spread} |')
+    return told
+
+
 def fall_rows(results: Any) -> list[str]:
     """Sentence about falls, as the only row."""
     (of,) = results.values()
@@ -465,6 +485,7 @@ STUDIES = {
     'any-command': Study(any_command, command_rows, 'doc/walking.md'),
     'stairs-what-one-foot-felt-all-know': Study(stairs, stair_rows, 'doc/walking.md'),
     'tightness-of-the-certificates': Study(tightness, tightness_rows),
+    'what-is-certified-over-what-fails': Study(None, delay_rows, 'doc/certificate.md'),
     'falls': Study(falls, fall_rows), 'stops-at-every-phase': Study(stops, stop_rows),
     'brisk-stops': Study(brisk_stops, brisk_rows, 'doc/walking.md'),
     'when-the-body-stands': Study(body_stops, body_rows, 'doc/walking.md'),

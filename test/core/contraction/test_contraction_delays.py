@@ -112,6 +112,12 @@ def test_what_no_gate_keeps_grows_with_the_age_of_samples() -> None:
     assert asked_premises(capture, 0.0)[1].holds
 
 
+def test_a_narrower_gate_bears_held_states_of_any_age() -> None:
+    drawn = [capture for _, capture in random_captures(np.random.default_rng(1), 100)]
+    assert [sum(MARGINS['held'](replace(capture, places=share * capture.places)) == np.inf
+                for capture in drawn) for share in (1.0, 0.5, 0.25)] == [15, 57, 79]
+
+
 def test_nothing_is_borne_where_capture_does_not_hold() -> None:
     capture = captured()
     weak = replace(capture, gains=0.5 * capture.gains)
