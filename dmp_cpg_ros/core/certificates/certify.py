@@ -165,8 +165,9 @@ def rest_inequalities(s: Setting, rest: InhibitedEquilibrium | None) -> list[Ine
         gait = s.network.gait
         path = FootPath((0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 1.0, gait.duty(0.0, s.network.scale),
                         s.parameters.leg.clearance * REST_ACTIVITY)
-        height = max(float(path.at(float(position))[0][2])
-                     for position in gait.cycle_position(phase(rest.state)))
+        height = path.clearance if s.parameters.leg.motion else max(  # it may lift feet anywhere
+            float(path.at(float(position))[0][2])
+            for position in gait.cycle_position(phase(rest.state)))
         radius = float(rest.radius.min()) / s.network.parameters.radius
         degrees = ', '.join(f'{np.degrees(a):.1f}' for a in rest.phase_ahead)
         ahead = f'legs rest {degrees} degrees ahead of their places'
