@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -65,7 +66,14 @@ class PostureFeedback:
 
     def of_leg(self, i: int) -> LegFeedback:
         """What the path of leg ``i`` takes of it."""
+        measured, shift, drift, correction, force = self._numbers
         return LegFeedback(
-            self.measured[3 * i : 3 * i + 3], self.shift_in_base[i], self.drift_in_base[i],
-            self.correction, float(self.foot_force[i]),
-            self.level[i], self.progress.rough if self.progress else 0.0)
+            measured[3 * i:3 * i + 3], shift[i], drift[i], correction, force[i], self.level[i],
+            self.progress.rough if self.progress else 0.0)
+
+    @cached_property
+    def _numbers(self) -> tuple[list[float], list[list[float]], list[list[float]], list[float],
+                                list[float]]:
+        """What is told of the legs, as numbers: four legs ask in turn."""
+        return (self.measured.tolist(), self.shift_in_base.tolist(), self.drift_in_base.tolist(),
+                self.correction.tolist(), self.foot_force.tolist())

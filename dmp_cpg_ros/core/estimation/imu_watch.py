@@ -115,8 +115,8 @@ class ImuWatch(NamedTuple):
         a = moved(self.unexplained, minus(felt, self.unexplained), share)
         size = hypot(a[0], a[1])
         if not self.doubted_s:
-            variance = after.covariance[TILT, TILT].diagonal()
-            most = DOUBTED + DEVIATIONS * GRAVITY * sqrt(float(variance[:2].max()))
+            roll, pitch, _ = after.covariance.diagonal()[TILT].tolist()
+            most = DOUBTED + DEVIATIONS * GRAVITY * sqrt(roll if roll > pitch else pitch)
             age, kept = self.age_s + dt, (self.kept, self.next_kept)
             if age >= BACK_S:
                 age, kept = 0.0, (self.next_kept, (after, slope))

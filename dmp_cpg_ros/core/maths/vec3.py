@@ -7,7 +7,7 @@ NumPy needs about a microsecond for any operation on three numbers, plain floats
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import sqrt
 
 Triple = tuple[float, float, float]
@@ -20,13 +20,13 @@ Matrix = tuple[Triple, Triple, Triple]
 """A matrix (3, 3), by rows."""
 
 
-def triple(values: Sequence[float]) -> Triple:
-    """Vector of three numbers in a sequence, such as ``array.tolist()``."""
+def triple(values: Iterable[float]) -> Triple:
+    """Vector of three numbers, such as those of ``array.tolist()``."""
     x, y, z = values
     return x, y, z
 
 
-def pair(values: Sequence[float]) -> Pair:
+def pair(values: Iterable[float]) -> Pair:
     """As :func:`triple` for two numbers."""
     x, y = values
     return x, y

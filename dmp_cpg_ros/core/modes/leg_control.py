@@ -245,7 +245,7 @@ class LegControl:
             motion, told = None, feedback.of_leg(place)
             if not feedback.felt[place]:  # its foot is where it was told to be
                 told = told._replace(joint_position=(
-                    *state.leg.sent[1:], state.leg.joints.position)[0])
+                    *state.leg.sent[1:], state.leg.joints.position)[0].tolist())
             leg, goal, goal_velocity = self.primitive.step(
                 state.leg, gait, x[place], x_dot[place], r, told, dt)
         else:

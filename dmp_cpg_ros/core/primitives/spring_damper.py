@@ -63,7 +63,7 @@ class SpringDamper:
     stiffness: Array
     damping: Array
     form: Form = 'scaled'
-    _propagators: dict[float, tuple[Array, list[list[list[float]]]]] = field(
+    _propagators: dict[float, tuple[Array, list[list[float]]]] = field(
         default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -182,11 +182,10 @@ class SpringDamper:
         -------
         SpringState
         """
-        (all_a, all_b), (all_c, all_d) = self._propagator(dt)[1]
         position, velocity = [], []
-        for y, y_dot, at, rate, a, b, c, d in zip(
+        for y, y_dot, at, rate, (a, b, c, d) in zip(
                 state.position.tolist(), state.velocity.tolist(), goal, goal_velocity,
-                all_a, all_b, all_c, all_d, strict=True):
+                self._propagator(dt)[1], strict=True):
             error, error_rate = y - (at - rate * dt), y_dot - rate
             position.append(at + a * error + b * error_rate)
             velocity.append(rate + c * error + d * error_rate)
@@ -207,14 +206,14 @@ class SpringDamper:
         """Exponential exp(A s), A = [[0, 1], [−k, −b]], for a length s [s]: (2, 2, n)."""
         return self._propagator(length)[0]
 
-    def _propagator(self, length: float) -> tuple[Array, list[list[list[float]]]]:
-        """The same as an array and as lists."""
+    def _propagator(self, length: float) -> tuple[Array, list[list[float]]]:
+        """The same as an array, and by rows as a list for each degree of freedom."""
         known = self._propagators.get(length)
         if known is None:
             if len(self._propagators) > 256:
                 self._propagators.clear()
             E = spring_exponential(self.stiffness, self.damping, length)
-            known = self._propagators[length] = (E, E.tolist())
+            known = self._propagators[length] = (E, E.reshape(4, -1).T.tolist())
         return known
 
     def _runge_kutta(self, y: Array, v: Array, drives: Array, grid: StepGrid

@@ -8,6 +8,7 @@ Jacobian.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Any, NamedTuple
@@ -105,18 +106,22 @@ class LegState(NamedTuple):
     sent: tuple[Array, ...] = ()
 
 
+Numbers = Sequence[float] | Array
+"""A few numbers, an array of them where nobody is in a hurry."""
+
+
 class LegFeedback(NamedTuple):
     """The part of the body's feedback that one leg's path takes.
 
     Attributes
     ----------
-    joint_position : ndarray (3,)
+    joint_position : sequence of 3 floats
         Measured angles [rad].
-    shift_in_base : ndarray (3,)
+    shift_in_base : sequence of 3 floats
         Wanted foot placement shift, for a swinging foot [m].
-    drift_in_base : ndarray (2,)
+    drift_in_base : sequence of 2 floats
         Added to the velocity of a standing foot [m/s].
-    correction : ndarray (3,)
+    correction : sequence of 3 floats
         Added to the reference for the stance velocity, not the cadence [m/s], [m/s], [rad/s].
     foot_force : float
         Measured normal force of the foot [N]; 0 without a contact sensor.
@@ -126,10 +131,10 @@ class LegFeedback(NamedTuple):
         Height of what the feet are to be lifted over [m]; 0 on even ground.
     """
 
-    joint_position: Array
-    shift_in_base: Array
-    drift_in_base: Array
-    correction: Array
+    joint_position: Numbers
+    shift_in_base: Numbers
+    drift_in_base: Numbers
+    correction: Numbers
     foot_force: float = 0.0
     level: float = 0.0
     rough: float = 0.0
@@ -244,7 +249,7 @@ class LegPrimitive:
     def path(self, reference: Triple, omega: float, duty: float, activity: float,
              stumble: reflex.Stumble, feedback: LegFeedback) -> FootPath:
         """Path of the foot for the corrected reference, higher over what was felt."""
-        v_x, v_y, gamma = plus(reference, triple(feedback.correction.tolist()))
+        v_x, v_y, gamma = plus(reference, triple(feedback.correction))
         clearance = reflex.swing_clearance(
             self.clearance, self.stumble_lift, stumble, feedback.rough, self.scale.leg_length)
         return FootPath(
@@ -274,11 +279,11 @@ class LegPrimitive:
             state.stumble, progress, lift if stands else activity * lift, lag, dt,
             feedback.rough > 0.0)
         if will_stand:
-            drift = pair(feedback.drift_in_base.tolist())
+            drift = pair(feedback.drift_in_base)
             slipped = away[:2] if stands else (0.0, 0.0)
             return self.offset_rates.in_stance(
                 offset, drift, slipped, activity, dt, feedback.level), stumble
-        placement = triple(feedback.shift_in_base.tolist())
+        placement = triple(feedback.shift_in_base)
         height, _ = swing_height(path.swung(then))
         rate = self.offset_rates.in_swing(offset, placement, height, activity, dt)
         return reflex.compliant_offset_rate(stumble, rate, path_velocity, away), stumble
@@ -303,8 +308,9 @@ class LegPrimitive:
         JointTargets
         """
         joints, p = state.joints if measured is None else measured, self.parameters
+        stiffness, damping = p.stiffness, p.damping
         effort = [
-            J * (p.stiffness * (g - y) - p.damping * (y_dot - g_dot)) + tau
+            J * (stiffness * (g - y) - damping * (y_dot - g_dot)) + tau
             for J, y, y_dot, g, g_dot, tau in zip(
                 self._inertia, joints.position.tolist(), joints.velocity.tolist(), goal,
                 goal_velocity, feedback.tolist(), strict=True)]
