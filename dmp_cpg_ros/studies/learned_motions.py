@@ -41,7 +41,8 @@ from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_suite
 
-REFUSED, NOT_CERTIFIED, KEPT = 'motion refused', 'suite not certified', 'kept'
+REFUSED, NOT_CERTIFIED, KEPT, UNASKED = (
+    'motion refused', 'suite not certified', 'kept', 'stopped by the body before')
 """What becomes of a case that does not fail."""
 
 _TICK_NS, _LONGEST_S = 4_000_000, 12.0
@@ -64,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
               f'at rest: {max(one["height"] for one in kept):.4f} of the standing height; '
               f'{sum(one["stood"] for one in kept)} stood to the end')
     write_results(options.json, found)
-    return int(bool(set(counts) - {REFUSED, NOT_CERTIFIED, KEPT}))
+    return int(bool(set(counts) - {REFUSED, NOT_CERTIFIED, KEPT, UNASKED}))
 
 
 def random_motion(rng: np.random.Generator) -> LearnedMotion:
@@ -123,6 +124,8 @@ def tried(told: bool, case: tuple[int, int]) -> dict[str, Any]:
         loop.request(False)
         for _ in range(int(rng.integers(300, 500))):
             state = robot.step(loop.tick(state).targets)
+        if loop.stop.requested:                           # the body has lain down or is damped
+            break
         bound = loop.time_to_rest()
         most = loop.in_force().stop_distance(loop.r, loop.gate.foreseen(
             state.time_ns + _TICK_NS))
@@ -147,7 +150,7 @@ def tried(told: bool, case: tuple[int, int]) -> dict[str, Any]:
                     'predicted': predicted, 'took': took, 'bound': bound}
         for _ in range(50):
             state = robot.step(loop.tick(state).targets)
-    return {'case': case, 'outcome': KEPT, 'share': share, 'height': height,
+    return {'case': case, 'outcome': KEPT if share else UNASKED, 'share': share, 'height': height,
             'stood': loop.mode.mode == 'standing'}
 
 

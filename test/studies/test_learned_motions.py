@@ -16,12 +16,19 @@ from dmp_cpg_ros.core.certificates.certify import GROUND, certify
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY
-from dmp_cpg_ros.studies.learned_motions import KEPT, NOT_CERTIFIED, REFUSED, random_motion, tried
+from dmp_cpg_ros.studies.learned_motions import (
+    KEPT,
+    NOT_CERTIFIED,
+    REFUSED,
+    UNASKED,
+    random_motion,
+    tried,
+)
 
 
 def test_stops_with_any_motion_are_as_promised() -> None:
     outcomes = [tried(True, (2, k)) for k in range(8)]
-    assert {one['outcome'] for one in outcomes} <= {KEPT, NOT_CERTIFIED, REFUSED}
+    assert {one['outcome'] for one in outcomes} <= {KEPT, NOT_CERTIFIED, REFUSED, UNASKED}
     assert any(one['outcome'] == KEPT for one in outcomes)
 
 
