@@ -35,7 +35,8 @@ class Floods:
     publishers : Publishers
         Who publishes a topic, as the graph tells.
     tell : callable (topic, text)
-        Told who is not received any more; again with an empty text when it has left.
+        Told who is not received any more; again when its name is known, and with an empty text
+        when it has left.
     """
 
     def __init__(self, publishers: Publishers, tell: Callable[[Interface, str], object]) -> None:
@@ -43,6 +44,7 @@ class Floods:
         self._publishers, self._tell = publishers, tell
         self._counts: dict[str, tuple[int, int]] = {}
         self._out: dict[str, frozenset[bytes]] = {}
+        self._told: dict[str, str] = {}
 
     def note(self, topic: Interface, now_ns: int, *, of_all: bool = False) -> None:
         """Count a message; when there are many, shut out who should not write the topic.
@@ -67,20 +69,19 @@ class Floods:
             self._shut_out(topic)
 
     def look(self, topic: Interface) -> None:
-        """Forget who has left the graph; to be called now and then."""
-        out = self._out.get(topic.name)
-        if out:
-            left = out & frozenset(self._strangers(topic))
-            if left != out:
-                self._ask(topic, left)
-            if not left:
-                self._tell(topic, '')
+        """Forget who has left the graph, and name who has a name now; called now and then."""
+        if out := self._out.get(topic.name):
+            strangers = self._strangers(topic)
+            left = {writer: strangers[writer] for writer in out if writer in strangers}
+            if len(left) < len(out):
+                self._ask(topic, frozenset(left))
+            self._name(topic, left)
 
     def forget(self) -> None:
         """Receive everybody again."""
         for name in self._out:
             OWN_SOCKETS.shut_out((self, name), ())
-        self._counts, self._out = {}, {}
+        self._counts, self._out, self._told = {}, {}, {}
 
     def _strangers(self, topic: Interface) -> dict[bytes, str]:
         """Names by GUID. Who has no name may be a writer of the suite, unless all are there."""
@@ -92,8 +93,15 @@ class Floods:
     def _shut_out(self, topic: Interface) -> None:
         strangers = self._strangers(topic)
         if strangers and self._ask(topic, frozenset(strangers)):
-            who = ', '.join(sorted(set(strangers.values())))
-            self._tell(topic, f'{topic.name} is flooded by {who}: nothing of that is '
+            self._name(topic, strangers)
+
+    def _name(self, topic: Interface, writers: dict[bytes, str]) -> None:
+        """Tell who is not received, unless that is what was told last."""
+        who = ', '.join(sorted({'a node of no name yet' if UNNAMED in name else name
+                                for name in writers.values()}))
+        if who != self._told.get(topic.name, ''):
+            self._told[topic.name] = who
+            self._tell(topic, who and f'{topic.name} is flooded by {who}: nothing of that is '
                        'received any more')
 
     def _ask(self, topic: Interface, writers: frozenset[bytes]) -> bool:
