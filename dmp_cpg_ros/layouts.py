@@ -50,9 +50,10 @@ a movement's is the phase of its canonical system, 0 while it does not move the 
 """
 
 GAIN_ROWS = (*LEGS, 'region_radius', 'rest_phase', 'requested', 'at_rest', 'automatic',
-             'opposite', 'share', 'quickness')
+             'opposite', 'share', 'quickness', 'lead')
 """Of ``inhibition_gains``: α_i [1/s] of each leg, r₀, the phase of fl at rest [rad], four flags
-that are 0 or 1, share of the command, and factor on the cadence.
+that are 0 or 1, share of the command, factor on the cadence, and how long after the stamp it is
+that all this begins to act [s].
 """
 
 REFERENCE_ROWS = ('v_x', 'v_y', 'gamma')

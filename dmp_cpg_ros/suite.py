@@ -56,6 +56,8 @@ class Suite:
         What it walks on.
     tick_ns : int
         Control tick [ns].
+    request_lead_s : float
+        Time after which requests act, and inhibition where it is armed, in real time [s].
     robot_file : Path
         The robot file that is named.
     file : Path
@@ -70,6 +72,7 @@ class Suite:
     mismatch: MismatchParameters
     world: World
     tick_ns: int
+    request_lead_s: float
     robot_file: Path
     file: Path
 
@@ -173,6 +176,7 @@ def _suite(path: Path, overrides: Mapping[str, Any], namespace: str) -> Suite:
     return Suite(parameters, gaits.named(gait.gait), gaits, robot[core.RobotParameters],
                  robot[SensorParameters], robot[MismatchParameters], world,
                  robot[core.TickParameters].tick_ns,
+                 sets[core.INHIBITION][core.RequestParameters].request_lead,
                  find_config(robot[core.RobotFileParameters].robot, ROBOTS), path)
 
 

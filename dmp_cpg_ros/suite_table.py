@@ -67,7 +67,7 @@ SUITE_TABLE: tuple[Kind, ...] = (
             *core.CERTIFIED, core.CommandParameters, core.CertificateParameters),
     _single(core.CANONICAL, 'CanonicalOscillators', *core.CERTIFIED, core.CertificateParameters),
     _single(core.INHIBITION, 'InhibitionNode', *core.CERTIFIED, core.CommandParameters,
-            core.CertificateParameters, VoteSourceParameters),
+            core.CertificateParameters, VoteSourceParameters, core.RequestParameters),
     _single(POSTURE, 'PostureControl', PostureParameters, ModeParameters, EstimationParameters,
             StateSourceParameters, core.GaitParameters, core.RobotFileParameters),
     Kind(LEG, 'LegTransformation',

@@ -104,7 +104,7 @@ def running_setting(suite: Suite) -> Setting:
 
 def _report(suite: Suite, of: Running, certificate: Certificate, needed: votes.VotesNeeded
             ) -> list[str]:
-    gaits = ', '.join(gait.name for gait in (of.gait, *of.others))
+    gaits, lead = ', '.join(gait.name for gait in (of.gait, *of.others)), suite.request_lead_s
     lines = [f'{suite.file}: {gaits} at up to {certificate.omega_max:.4g} rad/s, '
              f'{1e9 / suite.tick_ns:g} Hz', '', *_table(certificate.inequalities)]
     if certificate.rest_phase:
@@ -125,7 +125,9 @@ def _report(suite: Suite, of: Running, certificate: Certificate, needed: votes.V
         lines += ['', f"auto takes one of {', '.join(certificate.legs)}, each of them certified"
                   + (f"; {', '.join(others)} cannot hold the gait alone" if others else '')]
     return [*lines, '', f'from a request on the reference goes at most '
-            f'{no_less(certificate.distance_to_rest)} m, at its largest speed', '',
+            f'{no_less(certificate.distance_to_rest)} m, at its largest speed',
+            f'in real time {lead:g} s later, and time_to_rest is {2.0 * lead:g} s longer, '
+            f'time_to_walking {lead:g} s: request_lead, of the request and of arming', '',
             f'voting is {voting}; {_votes(needed)}',
             f'gains of each from which 1, 2, ... votes certainly stop it: {enough} 1/s; below '
             f'which they cannot: {too_weak} 1/s', '', f'certificate: {verdict}']

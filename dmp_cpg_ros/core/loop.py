@@ -26,6 +26,7 @@ from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait, limiting_gaits
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead, next_gait
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
@@ -222,8 +223,8 @@ class WalkingLoop:
             raise DataError(f'the gait cannot start: the robot is {self._barring}')
         self.stop = self.supervisor.request(self.stop, stop)
         self.outlook = look_ahead(
-            self.supervisor, self.reference, self.canonical, self.stop, self.inhibition,
-            self.canon, self.r, self._foreseen, self._dt)
+            self.supervisor, self.reference, self.canonical, self.stop,
+            Announced(self.inhibition), self.canon, self.r, self._foreseen, self._dt)
         return self.outlook.time_s
 
     @property
@@ -286,8 +287,8 @@ class WalkingLoop:
 
     def in_force(self) -> Running:
         """What runs, in the gait in force or in the change between two when a request acts."""
-        gait = next_gait(self.reference, self.canonical, self.inhibition, self.canon, self.r,
-                         self._foreseen, self._dt)
+        gait = next_gait(self.reference, self.canonical, Announced(self.inhibition), self.canon,
+                         self.r, self._foreseen, self._dt)
         first, *others = (self._reader.named(end.name) for end in gait.ends)
         return replace(self._described(self.parameters, first), others=tuple(others))
 

@@ -110,6 +110,15 @@ class TickParameters(Parameters):
 
 
 @dataclass(frozen=True)
+class RequestParameters(Parameters):
+    """When a request acts."""
+
+    request_lead: float = parameter(
+        0.024, 'real time: time after which a stop or a start acts on oscillators and reference, '
+        'at the same tick of both; 0: when they hear of it', 0.0, 0.2, unit='s')
+
+
+@dataclass(frozen=True)
 class LegChoice(Parameters):
     """Which leg a transformation node moves."""
 

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import (
-    Inhibition,
     InhibitionParameters,
     initial_inhibition,
 )
@@ -25,6 +24,7 @@ from dmp_cpg_ros.core.gait.contact_feedback import quarter_weight
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.handover import SilentStop
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import CANONICAL, CertificateParameters
@@ -35,7 +35,7 @@ from dmp_cpg_ros.nodes.framework.known_stop import KnownStop
 from dmp_cpg_ros.nodes.framework.parameters import Sets
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateWriter
-from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader
+from dmp_cpg_ros.nodes.messages.inhibition import AnnouncedReader
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
 from dmp_cpg_ros.nodes.messages.reference import read_reference
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader
@@ -77,7 +77,7 @@ class CanonicalOscillators(SuiteNode):
         feedback = self.parameters_of(CanonicalParameters).contact_feedback
         contacts = {'foot_contacts': stamped(FootContactsReader().read)} if feedback else {}
         self.match('reference', {'reference': read_reference, **contacts},
-                   delayed={'inhibition_gains': stamped(InhibitionGainsReader().read)},
+                   delayed={'inhibition_gains': stamped(AnnouncedReader().read)},
                    optional=contacts)
         self._memory = GaitMemory(self, gaits)
 
@@ -125,11 +125,12 @@ class CanonicalOscillators(SuiteNode):
             self._silent.step(stamp_ns, network, state.x, state.x_dot, r)
         self._watch_phases(network, r, dt)
 
-    def _take_inhibition(self, stamp_ns: int, gains: tuple[int, Inhibition] | None) -> None:
-        """Take what was heard last, or stop the gait when it is too old."""
+    def _take_inhibition(self, stamp_ns: int, gains: tuple[int, Announced] | None) -> None:
+        """Take what acts now, or stop the gait when what was heard last is too old."""
         if gains is None:
             return
-        known_ns, self._inhibition = gains
+        known_ns, announced = gains
+        self._inhibition = announced.at(stamp_ns).acting
         if self.lock_step or fresh(known_ns, stamp_ns, SILENT_NS + self.return_ns):
             if self._silent is not None:
                 self._silent = None

@@ -17,12 +17,18 @@ from dmp_cpg_ros.core.gait.contact_feedback import initial_contact_state
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import CanonicalState
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.handover import adopted
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.suite_parameters import INHIBITION, VOTE_SOURCES, TickParameters
+from dmp_cpg_ros.core.suite_parameters import (
+    INHIBITION,
+    VOTE_SOURCES,
+    RequestParameters,
+    TickParameters,
+)
 from dmp_cpg_ros.core.voting.parameters import VoteSourceParameters, VotingParameters
 from dmp_cpg_ros.core.voting.voters import VoteSensors
 from dmp_cpg_ros.core.voting.votes import VoteInbox
@@ -75,7 +81,9 @@ class InhibitionNode(SuiteNode):
         self._votes = self._voting.initial_state(self._network)
         self._state = self._supervisor.initial_state(
             leg=self.parameters_of(CanonicalParameters).first_leg)
-        self._acting = self._supervisor.inhibition(self._state)
+        self._announced = Announced(self._supervisor.inhibition(self._state))
+        self._lead_ns = 0 if self.lock_step else round(
+            1e9 * self.parameters_of(RequestParameters).request_lead)
         self._x: Any = None
         self._x_dot: Any = None
         self._r, self._body_mode = np.zeros(3), 'standing'
@@ -127,7 +135,7 @@ class InhibitionNode(SuiteNode):
         self.certified.limit(self._gate)
         # until a request acts a change of gait may begin, of which no inequality depends
         self._promises.take_over_parameters()
-        self._anew |= self._state.time_ns == self._state.request_ns or not (
+        self._anew |= self._is_on_its_way(self._state) or not (
             self._promises.holds_with(self.certified.running_in(self._network.gait)))
         self._told = ()  # the certificate may be another one
 
@@ -147,6 +155,7 @@ class InhibitionNode(SuiteNode):
         if not self._joined and not self._join(stamp_ns):
             self._held = (stamp_ns, values) if self.lock_step else None
             return
+        self._announced = self._announced.at(stamp_ns)
         self._slow, before = self._unhurried(gait), self._state
         self._body_mode, margins, progress = values['posture_feedback'] or (
             self._body_mode, None, None)
@@ -156,7 +165,7 @@ class InhibitionNode(SuiteNode):
         self._state = self._supervisor.step(
             before, stamp_ns, network, self._x, self._x_dot, self._r, self._gate.at(stamp_ns),
             self._votes.tally, self._barring, margins, progress, self.certified.wanted)
-        self._acting = self._supervisor.inhibition(self._state)
+        self._announce()
         # it goes with a clock that is set back
         self._promises.due_ns += min(0, stamp_ns - before.time_ns)
         self._tell_block(before)
@@ -182,7 +191,7 @@ class InhibitionNode(SuiteNode):
         parameters have changed, or another command has come before the request acted.
         """
         state, anew, self._anew = self._state, self._anew, False
-        overtaken = state.requested and before.time_ns == before.request_ns and (
+        overtaken = state.requested and self._is_on_its_way(before) and (
             self._gate.foreseen(state.time_ns) != self._promises.command)
         if state.requested != before.requested or (
                 (anew or overtaken) and not isfinite(state.measured_s)):
@@ -198,9 +207,14 @@ class InhibitionNode(SuiteNode):
         else:
             self.clear('blocked')
 
+    def _is_on_its_way(self, state: SupervisorState) -> bool:
+        """Whether the last request does not act yet at the tick after a state."""
+        tick_ns = self.parameters_of(TickParameters).tick_ns
+        return state.time_ns - state.request_ns < max(tick_ns, self._lead_ns - tick_ns)
+
     def _unhurried(self, gait: GaitInForce) -> GaitNetwork:
         """Oscillators at the cadence that a gait has but for the quickness that acts."""
-        quickness = self._acting.quickness
+        quickness = self._announced.acting.quickness
         if quickness == 1.0:
             return self._network
         return self._network.of(
@@ -233,7 +247,7 @@ class InhibitionNode(SuiteNode):
             unknown = replace(self._supervisor.inhibition(self._state), automatic=False)
             self._state = adopted(
                 self._others.known or unknown, stamp_ns, self._supervisor.parameters)
-            self._acting = self._supervisor.inhibition(self._state)
+            self._announced = Announced(self._supervisor.inhibition(self._state))
             if self._state.requested:
                 self._predict()
 
@@ -260,7 +274,7 @@ class InhibitionNode(SuiteNode):
     def _stop_now(self, automatic: bool = True) -> None:
         if not self._state.in_force or self._state.automatic and not automatic:
             self._state = self._supervisor.request(self._state, True, automatic)
-            self._acting = self._supervisor.inhibition(self._state)
+            self._announce()
             self._publish_gains()
             self._predict()
             self._publish()
@@ -294,7 +308,8 @@ class InhibitionNode(SuiteNode):
         if self._x is None:
             return Acting()
         gait = self._slow.gait
-        return Acting(gait.cadence_scale, (self._network, self._acting, self._x), gait.ends)
+        return Acting(gait.cadence_scale, (self._network, self._announced.latest, self._x),
+                      gait.ends)
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """State of the stop, once it is known."""
@@ -325,7 +340,7 @@ class InhibitionNode(SuiteNode):
         if self._blind:
             if stop:
                 self._state = self._supervisor.request(self._state, True)
-                self._acting = self._supervisor.inhibition(self._state)
+                self._announce()
                 self._publish_gains()
             return False, (
                 f'{self._blind}: no time to rest can be promised' + (
@@ -340,7 +355,7 @@ class InhibitionNode(SuiteNode):
             return True, ('stopped already, and steps to catch a push' if steps and stop
                           else f'already {self._state.state}')
         if not self.lock_step:  # what it takes to predict must not delay it
-            self._acting = self._supervisor.inhibition(self._state)
+            self._announce()
             self._publish_gains()
         self._waiting.acts(stop, answer)
         self._predict()
@@ -393,7 +408,7 @@ class InhibitionNode(SuiteNode):
         canonical = CanonicalState(present, wanted, self._slow.gait.cadence_scale, self._x,
                                    self._x_dot, initial_contact_state())
         self._promises.make(Present(
-            state, self._acting, canonical, self._slow, self._r,
+            state, self._announced, self._lead_ns, canonical, self._slow, self._r,
             self._gate.foreseen(state.time_ns + tick_ns), self._barring), known)
 
     # What is told ------------------------------------------------------------------------------
@@ -408,16 +423,22 @@ class InhibitionNode(SuiteNode):
                 now.tally.causes, now.tally.weights.tobytes(), now.leg, now.rest_phase,
                 now.block.acts, self._promises.latest)
 
+    def _announce(self) -> None:
+        """Let act what is to be told from now on."""
+        self._announced = self._announced.after(
+            self._state, self._supervisor.inhibition(self._state), self._lead_ns)
+
     def _publish_gains(self) -> None:
-        self._told_ns = self._state.time_ns
-        self._gains_publisher.publish(self._gains_writer.fill(self._told_ns, self._acting))
+        self._told_ns, told = self._state.time_ns, self._announced
+        self._gains_publisher.publish(
+            self._gains_writer.fill(self._told_ns, told.latest, told.latest_ns))
 
     def _publish_memory(self, stamp_ns: int) -> None:
         self._memory.publish(self._memory_writer.fill(
             stamp_ns, self._x, self._x_dot, self._slow.gait, self._r))
 
     def _publish(self) -> None:
-        state, acting, self._told = self._state, self._acting, self._news()
+        state, acting, self._told = self._state, self._announced.latest, self._news()
         promise = self._promises.latest
         told = {'requested': state.in_force, 'armed': state.armed, 'automatic': state.automatic,
                 'pushed': state.push.acts, 'blocked': state.block.acts,

@@ -20,7 +20,7 @@ from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified
 from dmp_cpg_ros.nodes.framework.gait_memory import GaitMemory
 from dmp_cpg_ros.nodes.framework.gaits import WalkedGaits
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader
+from dmp_cpg_ros.nodes.messages.inhibition import AnnouncedReader
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
 from dmp_cpg_ros.nodes.messages.reference import ReferenceWriter
 from dmp_cpg_ros.nodes.messages.values import stamped
@@ -44,9 +44,8 @@ class ReferenceFilter(SuiteNode):
         self._inhibition = Inhibition(False, np.zeros(len(LEGS)), 1.0)
         self._cadence = self.parameters_of(CanonicalParameters).cadence_scale
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
-        gains = InhibitionGainsReader()
         self.match('joint_states', {'joint_states': lambda _: None},
-                   delayed={'inhibition_gains': stamped(gains.read)})
+                   delayed={'inhibition_gains': stamped(AnnouncedReader().read)})
         self._memory = GaitMemory(self, self.certified.gaits)
         self._gate = self.certified.commands()
         self._walked = WalkedGaits(self, self.certified.gaits)
@@ -68,10 +67,10 @@ class ReferenceFilter(SuiteNode):
         self._cadence = approached(self._cadence, wanted, dt)
         command, gains = self._gate.at(stamp_ns), values['inhibition_gains']
         if gains is not None:
-            self._inhibition = gains[1]
-            if not (self.lock_step or fresh(
-                    gains[0], stamp_ns, SILENT_NS + self.return_ns)):
-                self._inhibition = replace(gains[1], requested=True)
+            heard_ns, announced = gains
+            self._inhibition = announced.at(stamp_ns).acting
+            if not (self.lock_step or fresh(heard_ns, stamp_ns, SILENT_NS + self.return_ns)):
+                self._inhibition = replace(self._inhibition, requested=True)
         self._r = self._system.towards(self._r, command, self._inhibition, dt)
         self._publisher.publish(self._writer.fill(stamp_ns, self._r))
 

@@ -22,6 +22,7 @@ from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.prediction import look_ahead, ticks_ahead
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
@@ -123,7 +124,7 @@ class Page:
         state = supervisor.initial_state(leg=p.canonical.first_leg)
         inhibition = supervisor.inhibition(state)
         ticks = ticks_ahead(
-            supervisor, reference, canonical, state, inhibition, canon, r, COMMAND, dt)
+            supervisor, reference, canonical, state, Announced(inhibition), canon, r, COMMAND, dt)
         frames: list[dict[str, Any]] = []
         told: dict[str, Any] = {}
         k, end = 0, round(WALKED / dt)
@@ -132,8 +133,8 @@ class Page:
             while begun < 0 or k < end:
                 if k == end:
                     state, begun = supervisor.request(state, request), k
-                    now = (supervisor, reference, canonical, state, inhibition, canon, r,
-                           COMMAND, dt)
+                    now = (supervisor, reference, canonical, state, Announced(inhibition), canon,
+                           r, COMMAND, dt)
                     predicted, ticks = look_ahead(*now, PATIENCE), ticks_ahead(*now)
                     end += round(PATIENCE / dt)
                 k += 1

@@ -32,6 +32,7 @@ from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.prediction import look_ahead
 from dmp_cpg_ros.core.loop import Array, WalkingLoop
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
@@ -143,8 +144,8 @@ def parts_of_a_tick() -> list[Row]:
         ('balance', lambda: loop.body.posture.step(balance, state, gait, x, x_dot, r, dt)),
         ('one leg', lambda: leg.step(of_leg, gait, x[0], x_dot[0], r, asked, dt)),
         ('prediction of a stop', lambda: look_ahead(
-            loop.supervisor, loop.reference, loop.canonical, stopping, loop.inhibition, loop.canon,
-            r, command, dt).time_s),
+            loop.supervisor, loop.reference, loop.canonical, stopping, Announced(loop.inhibition),
+            loop.canon, r, command, dt).time_s),
     ])
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.handover import adopted
 from dmp_cpg_ros.core.inhibition.prediction import look_ahead
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
@@ -88,8 +89,9 @@ class Oscillators(WalkingLoop):
         self.stop = adopted(self.inhibition, self.now_ns, self.supervisor.parameters)
         self.votes = self.voting.initial_state(self.network)
         return look_ahead(
-            self.supervisor, self.reference, self.canonical, self.stop, self.inhibition,
-            self.canon, self.r, self.gate.foreseen(self.now_ns + self.tick_ns), self._dt).time_s
+            self.supervisor, self.reference, self.canonical, self.stop,
+            Announced(self.inhibition), self.canon, self.r,
+            self.gate.foreseen(self.now_ns + self.tick_ns), self._dt).time_s
 
     def vote(self, weights: Mapping[str, float], voter: str = '') -> None:
         """Vote for a stop; no prediction of before the next tick knows of it."""

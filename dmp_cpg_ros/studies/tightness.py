@@ -33,6 +33,7 @@ from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import RunningGait
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.prediction import look_ahead
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, GaitSupervisor
 from dmp_cpg_ros.core.maths import Array
@@ -355,7 +356,7 @@ def rest_row(graph: str) -> Row:
     start = canonical.initial_state(gait, replace(p.inhibition, start_inhibited=False))
     slowest = max(
         look_ahead(supervisor, ReferenceSystem(p.reference), canonical,
-                   supervisor.request(walking, True), supervisor.inhibition(walking),
+                   supervisor.request(walking, True), Announced(supervisor.inhibition(walking)),
                    replace(start, x=network.locked_state(float(phi))), fastest, (0.0, 0.0, 0.0),
                    tick).time_s
         for phi in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False))

@@ -574,10 +574,11 @@ def test_an_interrupt_ends_a_lone_node_without_complaint(
     ('region_radius', -1.0), ('requested', 0.5), ('at_rest', -1.0), ('opposite', 2.0),
     ('share', 0.0), ('share', 1.5), ('share', math.nan),
     ('quickness', 0.9), ('quickness', 99.0), ('quickness', math.nan),
+    ('lead', -0.004), ('lead', 0.3), ('lead', math.nan),
 ])
 def test_an_inhibition_that_no_parameters_allow_is_refused(row: str, value: float) -> None:
     message = JointState(name=list(GAIN_ROWS),
-                         position=[400.0] * 4 + [0.3, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0])
+                         position=[400.0] * 4 + [0.3, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.024])
     read = InhibitionGainsReader().read(message)
     assert read.gains.tolist() == [400.0] * 4 and read.requested and not read.at_rest
     message.position[GAIN_ROWS.index(row)] = value

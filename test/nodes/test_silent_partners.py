@@ -19,6 +19,7 @@ from std_srvs.srv import SetBool
 
 from dmp_cpg_ros.core.balance.body_command import BodyCommand
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.nodes import posture_control
@@ -85,6 +86,7 @@ def watching(ros: Ros, *acting: tuple[str, int, Inhibition], wait_ns: int = PATI
 
 
 RUNS = Inhibition(False, np.zeros(4), 0.3)
+ACTS = Announced(RUNS)
 KNOWN = ('acting_gains', 1_000_000_000, RUNS)
 AT_FIRST = ('acting_gains', 0, Inhibition(True, np.zeros(4), 0.3, at_rest=True))
 STOPPED = Inhibition(True, np.zeros(4), 0.3, automatic=False)
@@ -169,7 +171,7 @@ def test_a_prediction_is_made_between_ticks_and_is_the_one_that_is_made_at_once(
     _, state, tick = walked(300)
     tasks, answers = Tasks(node, monkeypatch), []
     node._take_request(SetBool.Request(data=True)).bound_for(answers.append)
-    assert node._acting.requested and not answers
+    assert node._announced.latest.requested and not answers
     promise = node._promises.latest
     assert np.isnan(promise.predicted_s) and np.isfinite(promise.bound_s)
     tasks.waiting.pop(0)()
@@ -341,12 +343,12 @@ def test_reference_and_oscillators_stop_without_the_inhibition(ros: Ros) -> None
     for node in (reference, canonical):
         node.start()
     for age, silent in ((SILENT_NS, False), (SILENT_NS + TICK, True)):
-        told = (0, RUNS)
+        told = (0, ACTS)
         reference.on_tick(age, {'joint_states': None, 'inhibition_gains': told})
         canonical.on_tick(age, {'reference': np.zeros(3), 'inhibition_gains': told})
         assert reference._inhibition.requested == canonical._inhibition.requested == silent
         assert canonical.health.has_problem('inhibition') == silent
-    told = (SILENT_NS + TICK, RUNS)
+    told = (SILENT_NS + TICK, ACTS)
     canonical.on_tick(SILENT_NS + 2 * TICK, {
         'reference': np.zeros(3), 'inhibition_gains': told})
     assert not canonical._inhibition.requested
@@ -367,8 +369,8 @@ def test_who_may_come_back_is_waited_for_before_the_gait_stops(ros: Ros) -> None
         ros.nodes.append(node)
         node.start()
     for age in (0, SILENT_NS + TICK, SILENT_NS + RETURN_NS, SILENT_NS + RETURN_NS + TICK):
-        reference.on_tick(age, {'joint_states': None, 'inhibition_gains': (0, RUNS)})
-        canonical.on_tick(age, {'reference': np.zeros(3), 'inhibition_gains': (0, RUNS)})
+        reference.on_tick(age, {'joint_states': None, 'inhibition_gains': (0, ACTS)})
+        canonical.on_tick(age, {'reference': np.zeros(3), 'inhibition_gains': (0, ACTS)})
         silent = age > SILENT_NS + RETURN_NS
         assert reference._inhibition.requested == canonical._inhibition.requested == silent
 
@@ -428,11 +430,11 @@ def test_oscillators_and_reference_that_come_back_in_time_go_on_in_phase(
         node.start()
         sent: list[Any] = []
         node._publisher.publish = sent.append
-        node.on_tick(stamp - TICK, {**inputs, 'inhibition_gains': (stamp, RUNS)})
+        node.on_tick(stamp - TICK, {**inputs, 'inhibition_gains': (stamp, ACTS)})
         assert not sent  # the memory may come after the first tick
         node._memory._kept.append(message)
         node.elapsed = 0.0
-        node.on_tick(stamp, {**inputs, 'inhibition_gains': (stamp, RUNS)})
+        node.on_tick(stamp, {**inputs, 'inhibition_gains': (stamp, ACTS)})
     off = np.abs(canonical._state.x - then.x).max()
     assert (off < 0.01 and np.allclose(reference._r, then.r, atol=1e-3)) if goes_on else (
         off > 0.1 and not reference._r.any())
@@ -445,7 +447,7 @@ def test_a_memory_that_does_not_come_is_waited_for_no_longer_than_for_a_while(ro
     reference.start()
     reference._publisher.publish = sent.append  # type: ignore[method-assign]
     for stamp in range(TICK, 10 * gait_memory.PATIENT_NS, TICK):
-        reference.on_tick(stamp, {'joint_states': None, 'inhibition_gains': (stamp, RUNS)})
+        reference.on_tick(stamp, {'joint_states': None, 'inhibition_gains': (stamp, ACTS)})
         if sent:
             break
     assert stamp == TICK + gait_memory.PATIENT_NS
@@ -458,7 +460,7 @@ def test_gains_of_before_a_clock_that_was_set_back_are_those_of_a_silent_inhibit
     for node in (reference, canonical):
         node.start()
     for told_ns, silent in ((1_000_000_000_000, True), (TICK, False)):
-        told = (told_ns, RUNS)
+        told = (told_ns, ACTS)
         reference.on_tick(2 * TICK, {'joint_states': None, 'inhibition_gains': told})
         canonical.on_tick(2 * TICK, {'reference': np.zeros(3), 'inhibition_gains': told})
         assert reference._inhibition.requested == canonical._inhibition.requested == silent
@@ -512,7 +514,7 @@ def test_a_memory_that_cannot_be_read_costs_no_tick(ros: Ros) -> None:
             'reference': np.zeros(3)})):
         node.start()
         node._memory._kept.append(JointState(name=['nobody']))
-        node.on_tick(TICK, {**inputs, 'inhibition_gains': (TICK, RUNS)})
+        node.on_tick(TICK, {**inputs, 'inhibition_gains': (TICK, ACTS)})
         assert node.health.rejected['gait_memory'] == 1
         assert 'gait_memory' not in [topic.name for topic, _ in node._inputs]
         node.destroy_node()

@@ -131,13 +131,12 @@ class Running:
         return self.certificate().time_to_rest + time_to_slow(quickness) + later_arming(
             Setting.of(network, self.parameters, self.tick_s), x, r)
 
-    def stop_distance(self, r: Array, command: tuple[float, float, float]) -> float:
-        """Bound on the way of the reference r, ndarray (3,), after a stop is requested while a
-        command acts [m].
-        """
+    def stop_distance(
+            self, r: Array, command: tuple[float, float, float], lead_s: float = 0.0) -> float:
+        """Bound on the way of the reference r (3,) in a stop that acts a lead later [s] [m]."""
         turning = max(abs(float(r[2])), abs(command[2])) * self.scale.hip_radius
         return stop_distance(self.parameters.reference, math.hypot(*r[:2]),
-                             math.hypot(*command[:2]), self.tick_s, turning)
+                             math.hypot(*command[:2]), self.tick_s, turning, lead_s)
 
     def refused_now(self, before: Running, network: GaitNetwork, inhibition: Inhibition,
                     x: Array) -> str:

@@ -19,6 +19,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
 from dmp_cpg_ros.core.gait.running import CanonicalState, RunningGait
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.maths import Array
@@ -79,9 +80,10 @@ class Outlook(NamedTuple):
 
 
 def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
-                  state: SupervisorState, published: Inhibition, canon: CanonicalState, r: Array,
+                  state: SupervisorState, published: Announced, canon: CanonicalState, r: Array,
                   command: tuple[float, float, float], dt: float, horizon: float = 10.0,
-                  body_mode: str = 'standing') -> Generator[None, None, Outlook]:
+                  body_mode: str = 'standing', lead_ns: int = 0
+                  ) -> Generator[None, None, Outlook]:
     """Run ahead from a request; every step of the generator is a tick of what is looked ahead.
 
     Parameters
@@ -90,8 +92,8 @@ def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canoni
         The blocks as they run.
     state : SupervisorState
         Present state, the request included.
-    published : Inhibition
-        What was published before the request; it still acts at the next tick.
+    published : Announced
+        What has been published; the request, where it has not, is at the next tick.
     canon : CanonicalState
         Present state of the oscillators, gait and cadence perhaps on their way to others.
     r : ndarray (3,)
@@ -102,6 +104,8 @@ def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canoni
         Tick, and longest time that is looked ahead [s].
     body_mode : str
         What the body does, assumed to stay.
+    lead_ns : int
+        Time from what is published until it acts [ns]; 0: it acts at the next tick.
 
     Returns
     -------
@@ -110,7 +114,7 @@ def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canoni
     """
     down_s, way_m, speed, stop = 0.0, 0.0, hypot(r[0], r[1]), state.requested
     ticks = ticks_ahead(supervisor, reference, canonical, state, published, canon, r, command, dt,
-                        body_mode)
+                        body_mode, lead_ns)
     for k, (state, _, canon, r) in zip(range(1, ceil(horizon / dt) + 1), ticks, strict=False):
         if state.requested != stop:
             break
@@ -136,8 +140,9 @@ def look_ahead(*arguments: Any, **options: Any) -> Outlook:
 
 
 def ticks_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
-                state: SupervisorState, published: Inhibition, canon: CanonicalState, r: Array,
-                command: tuple[float, float, float], dt: float, body_mode: str = 'standing'
+                state: SupervisorState, published: Announced, canon: CanonicalState, r: Array,
+                command: tuple[float, float, float], dt: float, body_mode: str = 'standing',
+                lead_ns: int = 0
                 ) -> Iterator[tuple[SupervisorState, Inhibition, CanonicalState, Array]]:
     """Oscillators, reference and state of the stop tick by tick, without end; the parameters are
     those of :func:`looking_ahead`.
@@ -146,29 +151,39 @@ def ticks_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonica
     ------
     state : SupervisorState
     inhibition : Inhibition
-        What acts at the next tick.
+        What is published: without a lead what acts at the next tick.
     canon : CanonicalState
     r : ndarray (3,)
     """
-    tick_ns, inhibition = round(dt * 1e9), published
+    tick_ns = round(dt * 1e9)
     while True:
-        r = reference.towards(r, command, inhibition, dt)
-        canon = canonical.step(canon, r, inhibition, dt)
-        state = supervisor.step(state, state.time_ns + tick_ns, canonical.network(canon.gait),
-                                canon.x, canon.x_dot, r, command, body_mode=body_mode)
-        inhibition = supervisor.inhibition(state)
-        yield state, inhibition, canon, r
+        stamp_ns = state.time_ns + tick_ns
+        published = published.at(stamp_ns)
+        r = reference.towards(r, command, published.acting, dt)
+        canon = canonical.step(canon, r, published.acting, dt)
+        state = supervisor.step(state, stamp_ns, canonical.network(canon.gait), canon.x,
+                                canon.x_dot, r, command, body_mode=body_mode)
+        published = published.after(state, supervisor.inhibition(state), lead_ns)
+        yield state, published.latest, canon, r
 
 
-def next_gait(reference: ReferenceSystem, canonical: RunningGait, published: Inhibition,
-              canon: CanonicalState, r: Array, command: tuple[float, float, float], dt: float
-              ) -> GaitInForce:
-    """Gait in force at the next tick; the parameters are those of :func:`looking_ahead`.
+def next_gait(reference: ReferenceSystem, canonical: RunningGait, published: Announced,
+              canon: CanonicalState, r: Array, command: tuple[float, float, float], dt: float,
+              time_ns: int = 0) -> GaitInForce:
+    """Gait in force at the last tick before what is published acts, or else at the next tick;
+    the parameters are those of :func:`looking_ahead`, with the stamp of the last tick [ns].
 
-    A request acts a tick later: a change of gait may begin until then, and a stop in which it
-    does waits until the change stands still.
+    A change of gait may begin until then, and a stop in which it does waits until the change
+    stands still.
     """
-    return canonical.step(canon, reference.towards(r, command, published, dt), published, dt).gait
+    tick_ns, until_ns = round(dt * 1e9), published.latest_ns
+    while True:
+        time_ns += tick_ns
+        published = published.at(time_ns)
+        r = reference.towards(r, command, published.acting, dt)
+        canon = canonical.step(canon, r, published.acting, dt)
+        if time_ns + tick_ns >= until_ns:
+            return canon.gait
 
 
 def _up(canon: CanonicalState, state: SupervisorState, duty: float) -> bool:

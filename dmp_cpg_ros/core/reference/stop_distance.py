@@ -52,11 +52,12 @@ def slowing_time(parameters: ReferenceParameters, speed: float, wanted: float, t
 
 
 def stop_distance(parameters: ReferenceParameters, speed: float, commanded: float,
-                  tick_s: float, turning: float = 0.0) -> float:
+                  tick_s: float, turning: float = 0.0, lead_s: float = 0.0) -> float:
     """Bound on the way of the reference from the request of a stop, for ever after [m].
 
     v dt (n + 1/(1 − exp(−α_r dt))), the sum of the samples v exp(−α_r k dt) that are held for a
-    tick each, and n more; with the largest v that is reached within n ticks.
+    tick each, and n more; with the largest v that is reached within n ticks. A lead of the
+    request adds to those.
 
     Parameters
     ----------
@@ -70,13 +71,15 @@ def stop_distance(parameters: ReferenceParameters, speed: float, commanded: floa
         Control tick dt > 0 [s].
     turning : float
         Largest |γ| of both times the distance of a foot, s − |v| [m/s].
+    lead_s : float
+        Time from the request until it acts, beyond the ticks that it takes in any case [s].
 
     Returns
     -------
     float
         Length of the path in the plane; how the body follows it is not part of it.
     """
-    late, a_b = LATE_TICKS * tick_s, parameters.braking
+    late, a_b = LATE_TICKS * tick_s + lead_s, parameters.braking
     faster = (1.0 - exp(-parameters.alpha_r * late)) * (commanded - speed)
     most = speed + max(0.0, min(faster, parameters.max_acceleration * late))
     D = tick_s / (1.0 - exp(-parameters.alpha_r * tick_s))

@@ -9,13 +9,13 @@ from dataclasses import replace
 from math import inf, isfinite, nan
 from typing import TYPE_CHECKING, NamedTuple
 
-from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.certificates import gate
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import CanonicalState
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.prediction import Outlook, looking_ahead, next_gait
 from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
@@ -99,8 +99,10 @@ class Present(NamedTuple):
     ----------
     state : SupervisorState
         The request included.
-    acting : Inhibition
-        What was published before the request, and still acts at the next tick.
+    announced : Announced
+        What has been published; in lock-step before the request.
+    lead_ns : int
+        Time from what is published until it acts [ns]; 0: it acts at the next tick.
     canonical : CanonicalState
         Of the oscillators.
     slow : GaitNetwork
@@ -114,7 +116,8 @@ class Present(NamedTuple):
     """
 
     state: SupervisorState
-    acting: Inhibition
+    announced: Announced
+    lead_ns: int
     canonical: CanonicalState
     slow: GaitNetwork
     r: Array
@@ -176,8 +179,8 @@ class Promises:
         """
         state, tick_s = now.state, self._tick_ns * 1e-9
         self.command = now.command
-        gait = next_gait(self._reference, self._running_gait, now.acting, now.canonical, now.r,
-                         now.command, tick_s)
+        gait = next_gait(self._reference, self._running_gait, now.announced, now.canonical, now.r,
+                         now.command, tick_s, state.time_ns)
         since_s, before_m = 1e-9 * (state.time_ns - state.request_ns), self.latest.bound_m
         if since_s <= 0.0 or isfinite(state.measured_s):  # pushed in full swing, it runs already
             since_s = before_m = 0.0
@@ -195,20 +198,22 @@ class Promises:
 
         self.latest = bounded
         self._slices.begin(looking_ahead(
-            self._supervisor, self._reference, self._running_gait, state, now.acting,
-            now.canonical, now.r, now.command, tick_s, body_mode=now.barring), predicted)
+            self._supervisor, self._reference, self._running_gait, state, now.announced,
+            now.canonical, now.r, now.command, tick_s, body_mode=now.barring,
+            lead_ns=now.lead_ns), predicted)
 
     def _bounded(self, gait: GaitInForce, now: Present) -> Promise:
         """What is certain of a request that acts in a gait, from now on."""
-        state = now.state
+        state, lead_s = now.state, 1e-9 * now.lead_ns
         self._for = running = self._certified.running_in(gait)
         self.due_ns, way = inf, nan
         if not state.requested:
-            bound = self._certified.certificate_in(gait).time_to_walking
+            bound = self._certified.certificate_in(gait).time_to_walking + lead_s
         else:
-            way = running.stop_distance(now.r, now.command)
+            way = running.stop_distance(now.r, now.command, lead_s)
             bound = self._bound_by_votes(now) if state.voted else running.time_to_rest(
                 now.slow, now.canonical.x, now.r, state.quickness)
+            bound += 2.0 * lead_s  # of the request, and of arming
             if isfinite(bound):
                 self.due_ns = state.time_ns + 1e9 * bound
         return Promise(state.measured_s, bound, way)

@@ -230,8 +230,8 @@ TOPICS: tuple[Interface, ...] = (
               (INHIBITION,), ('user',), latched=True),
     Interface('inhibition_gains', JointState,
               'position = gain of each leg [1/s], region_radius, rest_phase [rad], requested, '
-              'at_rest, automatic, opposite, share, quickness; when they change, and ten times a '
-              'second',
+              'at_rest, automatic, opposite, share, quickness, lead until they act [s]; when they '
+              'change, and ten times a second',
               (INHIBITION,), (REFERENCE, CANONICAL), latched=True),
     Interface('acting_gains', JointState,
               'what acts of inhibition_gains, when it changes: who restarts inhibition finds it',

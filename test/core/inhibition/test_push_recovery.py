@@ -24,6 +24,7 @@ from dmp_cpg_ros.core.balance.controller import (
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.inhibition import push_recovery
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.prediction import look_ahead
 from dmp_cpg_ros.core.inhibition.push_recovery import MOST_RELEASES
 from dmp_cpg_ros.core.loop import WalkingLoop
@@ -53,8 +54,8 @@ def resting(**changes: object) -> tuple[Run, Told]:
 
 def ahead(loop: WalkingLoop) -> float:
     """Predicted time from now, where what was published acts at the next tick [s]."""
-    return look_ahead(loop.supervisor, loop.reference, loop.canonical, loop.stop, loop.inhibition,
-                   loop.canon, loop.r, (0.0, 0.0, 0.0), TICK).time_s
+    return look_ahead(loop.supervisor, loop.reference, loop.canonical, loop.stop,
+                   Announced(loop.inhibition), loop.canon, loop.r, (0.0, 0.0, 0.0), TICK).time_s
 
 
 def test_a_push_at_rest_releases_the_gait_and_it_rests_again_as_predicted() -> None:

@@ -21,6 +21,7 @@ from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.suggest import suggest_gains
 from dmp_cpg_ros.core.certificates.votes import vote_bound, votes_needed
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.prediction import look_ahead
 from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -164,7 +165,7 @@ def test_the_prediction_of_a_stop_by_votes_is_kept_to_the_tick() -> None:
     loop = run.loop
     assert loop.stop.voted
     predicted = look_ahead(loop.supervisor, loop.reference, loop.canonical, loop.stop,
-                        loop.inhibition, loop.canon, loop.r,
+                        Announced(loop.inhibition), loop.canon, loop.r,
                         loop.gate.at(run.time_ns - TICK_NS), TICK).time_s
     run.until('at_rest')
     assert loop.stop.measured_s == pytest.approx(predicted, abs=1e-9)
