@@ -15,6 +15,8 @@ from std_msgs.msg import Int64
 
 from dmp_cpg_ros.nodes.framework.execution import make_executor
 from dmp_cpg_ros.nodes.framework.ticks import (
+    AHEAD_NS,
+    CONFIRMED,
     HOLD_TICKS,
     PATIENCE,
     PENDING_TICKS,
@@ -188,15 +190,99 @@ def test_a_robot_that_starts_again_is_followed(lock_step: bool) -> None:
     assert len(fired) == 15
 
 
+Told = tuple[int, int]
+"""Run of the robot, and its tick."""
+
+SOUND = 60
+"""Ticks in the end in which nothing stalls or is lost; the first tick has everything too."""
+
+
+def stalling(draw: random.Random, runs: list[list[int]], longest: int) -> list[tuple[str, Told]]:
+    """Arrivals of the ticks of one run of the robot after another: each input keeps its order,
+    stalls now and then for up to ``longest`` ticks, after which what it was about to tell comes
+    at once, and loses some.
+    """
+    sent = [(run, tick) for run, ticks in enumerate(runs) for tick in ticks]
+    arrivals = []
+    for place in range(len(INPUTS)):
+        late = [0] * len(sent)
+        lost = [draw.random() < 0.05 for _ in sent]
+        for _ in range(draw.randrange(6)):
+            begin, length = draw.randrange(1, len(sent)), draw.randint(2, longest)
+            end = min(begin + length, len(sent) - SOUND)
+            for k in range(begin, end):
+                late[k] = max(late[k], end - k)
+        arrivals += [(k + late[k], place, k) for k in range(len(sent))
+                     if not lost[k] or k == 0 or k >= len(sent) - SOUND]
+    return [(INPUTS[place], sent[k]) for _, place, k in sorted(arrivals)]
+
+
+def fed(arrivals: list[tuple[str, Told]]) -> tuple[list[bool], list[tuple[int, dict]]]:
+    """What was taken to be of this run, and the ticks that fired, of messages that bear the run
+    and the tick in which they were sent.
+    """
+    inputs, fired = recorder()
+    return [inputs.add(name, tick * TICK, (run, tick)) for name, (run, tick) in arrivals], fired
+
+
+@given(SEEDS, st.sampled_from([20, 100, 700]))
+def test_messages_of_writers_that_stalled_are_late_and_no_other_run(
+        seed: int, longest: int) -> None:
+    """Among them stalls that last longer than any stamp may lie behind or ahead."""
+    draw = random.Random(seed)
+    taken, fired = fed(stalling(draw, [list(range(draw.randrange(100), 1000))], longest))
+    stamps = [stamp for stamp, _ in fired]
+    assert all(taken)
+    assert stamps == sorted(set(stamps))
+    for stamp, values in fired[-SOUND // 2:]:
+        assert set(values.values()) == {(0, stamp // TICK)}
+
+
+@given(SEEDS, st.sampled_from([20, 100, 700]), st.booleans())
+def test_a_robot_that_starts_again_is_followed_once_whatever_stalls(
+        seed: int, longest: int, ahead: bool) -> None:
+    """Its clock begins anew below what it was or, where it is set, ahead of it."""
+    draw = random.Random(seed)
+    far = AHEAD_NS // TICK
+    apart = draw.randrange(RESET_NS // TICK + 1, 5 * far) + ahead * far
+    first = list(range(6000, 6400))
+    begin = first[-1] + apart if ahead else first[-1] - apart
+    second = list(range(begin, begin + 500))
+    _, fired = fed(stalling(draw, [first, second], longest))
+    told = [values['a'] for _, values in fired]
+    assert told == sorted(set(told))
+    for _, values in fired[-SOUND // 2:]:
+        assert values == dict.fromkeys(INPUTS, values['a']) and values['a'][0] == 1
+    if abs(apart) > far + len(first) + len(second):  # else stamps alone do not tell the runs apart
+        assert all({run for run, _ in values.values()} == {values['a'][0]} for _, values in fired)
+
+
+@given(SEEDS)
+def test_a_single_writer_does_not_take_the_others_to_another_time(seed: int) -> None:
+    """One tells any stamps for a while, by which the others' ticks are none the worse."""
+    draw, (inputs, fired) = random.Random(seed), recorder()
+    for tick in range(1000, 1200):
+        for name in INPUTS:
+            false = name == 'c' and 1050 <= tick < 1150
+            stamp = draw.randrange(2000 * TICK) if false else tick * TICK
+            inputs.add(name, stamp, None if false else tick)
+    stamps = [stamp // TICK for stamp, _ in fired]
+    assert stamps == list(range(1000, 1200))
+    assert all(values['a'] == values['b'] == stamp for stamp, (_, values) in zip(
+        stamps, fired, strict=True))
+    late = RESET_NS // TICK + 1  # what lies ahead by less is not told from the truth
+    assert [values['c'] for _, values in fired[150 + late:]] == stamps[150 + late:]
+
+
 def test_in_real_time_what_is_sent_on_change_survives_a_reset() -> None:
     inputs, fired = recorder(delayed=('late',))
     inputs.add('late', 0, 'state')
-    for tick in (1000, 0):
+    for tick in (1000, *range(CONFIRMED)):
         for name in INPUTS:
             inputs.add(name, tick * TICK, tick)
     inputs.add('late', 0, 'state of long ago')
-    assert [values['late'] for _, values in fired] == ['state', 'state']
-    assert inputs.last_ns == 0
+    assert [values['late'] for _, values in fired] == ['state'] * (1 + CONFIRMED)
+    assert inputs.last_ns == (CONFIRMED - 1) * TICK
 
 
 def test_memory_is_bounded() -> None:

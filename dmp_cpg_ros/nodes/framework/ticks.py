@@ -8,6 +8,7 @@ takes any rclpy subscription.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -19,7 +20,9 @@ AHEAD_NS = 2_000_000_000
 """A stamp that lies further ahead of the last tick is of a clock that was set, or false [ns]."""
 
 CONFIRMED = 3
-"""In real time: messages in a row that must agree on another time before it is believed."""
+"""In real time: messages of the trigger in a row that must agree on another time before it is
+believed.
+"""
 
 PENDING_TICKS = 16
 """Ticks that may be incomplete at one time; older ones are forgotten."""
@@ -40,6 +43,12 @@ class TickInputs:
     fires the same way, or else with the newest value of each input that does not come: that was
     lost, for a later one of its kind is there; that is silent; or for which ``HOLD_TICKS`` later
     ticks have waited. A node that stalls so delays those behind it instead of being left behind.
+
+    Every writer sends its stamps in rising order during one run of the robot, and its messages
+    keep their order. So a message that lies behind the last tick, but beyond what its writer told
+    before, is late and nothing else. Without the trigger there is no tick: only it can tell that
+    the clock was set, by messages that lie before what it told itself, or too far ahead. What
+    others tell beyond their own last message is of this run, however far the trigger is behind.
 
     Parameters
     ----------
@@ -73,7 +82,7 @@ class TickInputs:
         self._on_repeat = on_repeat
         self._others = tuple(name for name in inputs if name != trigger)
         self._held: dict[str, Any] = dict.fromkeys(delayed)
-        self._astray: list[tuple[str, int, Any]] = []
+        self._astray: dict[str, deque[tuple[int, Any]]] = {}
         self.ignored = 0
         self.reset()
 
@@ -88,6 +97,7 @@ class TickInputs:
         self._late: dict[str, dict[int, Any]] = {name: {} for name in self._delayed}
         self._missed = dict.fromkeys(self._inputs, 0)
         self.last_ns: int | None = None
+        self._near_ns: int | None = None  # the last tick, or what the trigger began anew with
 
     def add(self, name: str, stamp_ns: int, value: Any) -> bool:
         """Take a message; ticks that it completes are fired before this returns.
@@ -104,18 +114,27 @@ class TickInputs:
         Returns
         -------
         bool
-            Whether the stamp can be of this robot's run. When ``CONFIRMED`` messages in a row
-            agree on another time, the robot has started again, and ticks begin anew with them.
+            Whether the stamp can be of this robot's run. When ``CONFIRMED`` messages in a row of
+            the trigger, and none of this run between them, agree on another time, the robot has
+            started again, and ticks begin anew with what has come of that time.
         """
         if name in self._held:
             self._add_delayed(name, stamp_ns, value)
             return True
-        last = self.last_ns
-        if last is not None and not -RESET_NS < stamp_ns - last <= AHEAD_NS:
-            return self._follow_clock(name, stamp_ns, value)
+        near, last = self._near_ns, self.last_ns
+        if near is not None and not -RESET_NS < stamp_ns - near <= AHEAD_NS:
+            newest_ns = self.newest_ns(name)
+            if newest_ns - RESET_NS < stamp_ns < near:
+                self.ignored += 1
+                return True
+            if name == self._trigger or not near < newest_ns < stamp_ns <= newest_ns + AHEAD_NS:
+                return self._follow_clock(name, stamp_ns, value)
         if self._astray:
-            self._astray = []
+            self._astray = {}
         newest = self._newest.get(name)
+        if newest is not None and stamp_ns <= newest[0] - RESET_NS:
+            self._take_back(name, stamp_ns)
+            newest = None
         if newest is None or stamp_ns > newest[0]:
             self._newest[name] = (stamp_ns, value)
             if last is None or stamp_ns >= last:
@@ -137,18 +156,28 @@ class TickInputs:
         return True
 
     def _follow_clock(self, name: str, stamp_ns: int, value: Any) -> bool:
-        """Keep a message of another time, or begin anew with all of them."""
-        self._astray = [
-            (other, at, known) for other, at, known in self._astray
-            if abs(at - stamp_ns) < RESET_NS and (other != name or at < stamp_ns)]
-        self._astray.append((name, stamp_ns, value))
-        if len(self._astray) < (1 if self._lock_step else CONFIRMED):
+        """Keep a message of another time, or begin anew with all of them if it confirms that."""
+        astray = self._astray.setdefault(name, deque(maxlen=PENDING_TICKS))
+        while astray and not 0 < stamp_ns - astray[-1][0] < RESET_NS:
+            astray.pop()
+        astray.append((stamp_ns, value))
+        if name != self._trigger or len(astray) < (1 if self._lock_step else CONFIRMED):
             return False
-        astray, self._astray = self._astray, []
+        others, self._astray = self._astray, {}
         self.reset()
-        for message in astray:
-            self.add(*message)
+        self._near_ns = astray[0][0]
+        for at, other, known in sorted((
+                (at, other, known) for other, all_of in others.items() for at, known in all_of
+                if abs(at - stamp_ns) < RESET_NS), key=lambda message: message[:1]):
+            self.add(other, at, known)
         return True
+
+    def _take_back(self, name: str, stamp_ns: int) -> None:
+        """Forget what an input has told of later ticks: it was false, or of the run before."""
+        for stamp in [stamp for stamp in self._pending if stamp > stamp_ns]:
+            self._pending[stamp].pop(name, None)
+            if not self._pending[stamp]:
+                del self._pending[stamp]
 
     def awaited(self) -> tuple[int, list[str]]:
         """Stamp of the oldest tick that is not complete [ns], and the inputs that it lacks; −1
@@ -244,7 +273,7 @@ class TickInputs:
         del self._pending[stamp]
         for name, late in self._late.items() if self._lock_step else ():
             self._late[name] = {at: value for at, value in late.items() if at >= stamp}
-        self.last_ns = stamp
+        self.last_ns = self._near_ns = stamp
         self._on_tick(stamp, tick)
 
 
