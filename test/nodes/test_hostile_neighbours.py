@@ -452,6 +452,34 @@ def test_a_topic_has_one_writer(ros: Ros, follower: Any) -> None:
     robot.destroy_node()
 
 
+@pytest.mark.parametrize('set_by_s', [-3600, 3600])
+def test_a_time_of_day_that_is_set_makes_nobody_a_stranger(
+        follower: Any, monkeypatch: pytest.MonkeyPatch, set_by_s: int) -> None:
+    """The writer is heard on, and after its death whoever takes its place."""
+    now_ns, set_ns, taken = 10**12, 10**18, list[Any]()
+    monkeypatch.setattr(time, 'monotonic_ns', lambda: now_ns)
+    monkeypatch.setattr(time, 'time_ns', lambda: set_ns + now_ns)
+    topic = interface('joint_states')
+    receive = follower.writers.only(topic, taken.append, serialized_reader(topic.type))
+
+    def told(number: int, tick: int) -> None:
+        nonlocal now_ns
+        now_ns += 4_000_000
+        receive(serialize_message(still(topic, 4_000_000 * tick)),
+                {'publication_sequence_number': number, 'received_timestamp': time.time_ns()})
+
+    for tick in range(1, 101):
+        told(tick, tick)
+    set_ns += set_by_s * 10**9
+    for tick in range(101, 201):
+        told(tick, tick)
+    now_ns += 2 * SILENT_NS
+    for number in range(1, 21):
+        told(number, 500 + number)
+    assert len(taken) == 220
+    assert 'joint_states' not in follower.health.rejected
+
+
 def test_several_who_command_are_told(ros: Ros, follower: Any) -> None:
     topic = interface('cmd_vel')
     nodes = [Node(name, context=ros.context) for name in ('teleop', 'joystick')]

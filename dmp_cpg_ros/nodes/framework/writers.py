@@ -39,6 +39,9 @@ SEVERAL_S = 2.0
 STALE_NS = 250_000_000
 """In real time: age from which messages of ticks are not worth being worked through [ns]."""
 
+LONGEST_WAIT_NS = 1_000_000_000
+"""What seems to have waited longer in a queue was received before the time of day was set [ns]."""
+
 
 class Publishers:
     """Who publishes topics of the suite, as the graph tells a node; not asked at every message.
@@ -90,10 +93,15 @@ def with_number(message: Any, information: Mapping[str, Any] | None
                 ) -> tuple[Any, int | None, int]:
     """A message, its number among those of its publisher, and when it was received [ns], from
     what an executor hands to a callback: the events executor hands both over as one.
+
+    The middleware tells the time of day, which may be set at any time; it is taken to the
+    monotonic clock.
     """
     if information is None:
         message, information = message
-    return message, information['publication_sequence_number'], information['received_timestamp']
+    waited_ns = time.time_ns() - information['received_timestamp']
+    return (message, information['publication_sequence_number'],
+            time.monotonic_ns() - max(0, min(waited_ns, LONGEST_WAIT_NS)))
 
 
 def is_ticked(topic: Interface) -> bool:
@@ -168,7 +176,7 @@ class TopicWriters:
                 if not any(watch.may_admit(number, stamp_ns, now_ns) for watch in watches):
                     self._refuse(topic, now_ns)
                     return
-                if ticked and not lock_step and time.time_ns() > now_ns + STALE_NS:
+                if ticked and not lock_step and time.monotonic_ns() > now_ns + STALE_NS:
                     return
                 message = read(data)  # only what can be read makes its sender the writer
                 watch = alone or by_leg.get(node.leg_of((message.name or ('',))[0]))
@@ -214,7 +222,7 @@ class TopicWriters:
         """Name strangers among the publishers of topics that have their own writers, and tell
         where several command; to be called now and then.
         """
-        node, now_ns, now_s = self._node, time.time_ns(), time.monotonic()
+        node, now_ns, now_s = self._node, time.monotonic_ns(), time.monotonic()
         for topic in topics:
             count = expected_count(topic.publishers)
             if not count or topic.name.startswith('~') or topic.name in SHARED:
