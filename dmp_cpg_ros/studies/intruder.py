@@ -6,8 +6,9 @@
 real time unless ``--lock-step`` is given, and publishes forged messages, replays, garbage and
 floods on every topic of the suite, parameter events and requests, and transitions that are not
 possible. After each attack it looks whether the robot is on its feet and at its speed, and how
-soon the intruder was named on ``/diagnostics``. Exit status 1 when an attack succeeded, or whoever
-attacked was not named.
+soon the intruder was named on ``/diagnostics``. In the middle of each flood it asks for a stop, as
+a user may, and resumes when the robot rests. Exit status 1 when an attack succeeded, a stop was
+not heard, or whoever attacked was not named.
 
 The documented services and ``cmd_vel`` are open to everybody and are not attacked; neither are
 requests that are valid, such as deactivating a node, which only DDS Security can refuse.
@@ -19,7 +20,7 @@ import argparse
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from math import isfinite, nan, remainder, tau
 from pathlib import Path
@@ -40,6 +41,9 @@ SPEED = 0.5
 STEADY_S = 4.0
 """Time of the robot from which it walks steadily [s]."""
 
+RESTING = 0.05
+"""Speed below which the robot has stopped [m/s]."""
+
 RECOVERY_S, LATEST_S = 3.0, 8.0
 """Times of the robot after an attack from and until which it is looked whether it walks as before
 [s]: whoever took up a stand by himself at its end has to come to rest and to start.
@@ -51,8 +55,10 @@ SLOWEST, FASTEST, LOWEST, MOST_TURNED = 0.35, 0.65, 0.15, 0.5
 
 @dataclass
 class Outcome:
-    """What came of an attack; it failed when the robot walked on. The memory is that which the
-    suite's processes had after it together [MB].
+    """What came of an attack; it failed when the robot walked on, and came to rest where it was
+    told to. The memory is that which the suite's processes had after it together [MB];
+    ``refused`` are the messages that nodes told to have refused, and ``shutters`` those nodes that
+    did not receive the intruder any more.
     """
 
     attack: str
@@ -62,6 +68,9 @@ class Outcome:
     turned: float
     named_s: float
     memory_mb: float = nan
+    refused: int = 0
+    shutters: int = 0
+    stopped: bool = True
 
     @property
     def walked_on(self) -> bool:
@@ -120,10 +129,13 @@ class Suite:
 def attacked(node: Intruder, suite: Suite, name: str) -> Outcome:
     """Attack and look what comes of it."""
     node.named, node.begin, sent = nan, time.monotonic(), node.sent
-    heading = node.poses[-1].yaw
+    heading, refused = node.poses[-1].yaw, sum(node.refused.values())
+    node.stop = None
+    node.shutters.clear()
     ATTACKS[name](node)
-    named = node.named
+    named, shutters = node.named, len(node.shutters)
     node.leave()
+    stopped = node.stop is None or came_to_rest(node, suite)
     ended_s, deadline = node.poses[-1].time_s, time.monotonic() + WITHIN_S
     while suite.running() and time.monotonic() < deadline:
         passed_s = node.poses[-1].time_s - ended_s
@@ -134,7 +146,22 @@ def attacked(node: Intruder, suite: Suite, name: str) -> Outcome:
     fell = node.fell or not suite.running() or node.poses[-1].z < LOWEST
     return Outcome(name, node.sent - sent, fell, node.speed(),
                    remainder(node.poses[-1].yaw - heading, tau), max(named - node.begin, 0.0),
-                   suite.memory_mb())
+                   suite.memory_mb(), sum(node.refused.values()) - refused, shutters, stopped)
+
+
+def came_to_rest(node: Intruder, suite: Suite) -> bool:
+    """Whether a stop that was asked for was answered and the robot rests; it is resumed then."""
+    def wait(done: Callable[[], bool]) -> bool:
+        begin_s, deadline = node.poses[-1].time_s, time.monotonic() + WITHIN_S
+        while not done() and suite.running() and time.monotonic() < deadline and (
+                node.poses[-1].time_s < begin_s + LATEST_S):
+            node.spin(0.1)
+        return done()
+
+    # While nothing is known of the gait no time is promised, but it is stopped.
+    rests = wait(lambda: node.stop.done() and abs(node.speed(0.5)) < RESTING)
+    resumed = node.ask(False)
+    return wait(resumed.done) and resumed.result().success and rests
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -180,7 +207,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     write_results(options.json, {
         'seed': options.seed, 'duration_s': options.duration, 'messages': node.sent,
         'begin_mb': suite.begin_mb, 'attacks': list(map(asdict, outcomes))})
-    return int(not all(outcome.walked_on and outcome.told for outcome in outcomes))
+    return int(not all(one.walked_on and one.told and one.stopped for one in outcomes))
 
 
 def memories(outcomes: Sequence[Outcome]) -> str:
@@ -202,9 +229,12 @@ def table(outcomes: Sequence[Outcome]) -> str:
                          str(sum(outcome.fell for outcome in of)),
                          str(sum(not outcome.walked_on for outcome in of)),
                          f'{max(abs(outcome.turned) for outcome in of):.2f} rad',
+                         f'{sum(outcome.refused for outcome in of):,}',
+                         str(max(outcome.shutters for outcome in of)),
+                         str(sum(not outcome.stopped for outcome in of)),
                          f'{late:.1f} s' if isfinite(late) else '-'))
     return markdown_table(('attack', 'times', 'messages', 'falls', 'did not walk on', 'turned',
-                           'named within'), rows)
+                           'refused', 'shut out by', 'stops unheard', 'named within'), rows)
 
 
 if __name__ == '__main__':

@@ -84,9 +84,12 @@ def _old(name: str) -> Callable[[Intruder], None]:
 
 
 def _flood(name: str, make: Callable[[Intruder], bytes]) -> Callable[[Intruder], None]:
+    """Flood a topic; half way a user asks for a stop from the same process."""
     def attack(node: Intruder) -> None:
         data = make(node)
-        node.repeat(2.0 * ATTACK_S, 1e9, lambda: node.publish(name, data))
+        node.repeat(ATTACK_S, 1e9, lambda: node.publish(name, data))
+        node.stop = node.ask(True)
+        node.repeat(ATTACK_S, 1e9, lambda: node.publish(name, data))
 
     return attack
 
@@ -270,10 +273,8 @@ ATTACKS: dict[str, Callable[[Intruder], None]] = {
     'body_mode': _modes,
     'clock, drive_mode and inhibition_state': _progress,
     '10 MB': _huge,
-    **{f'flood of old {name}': _flood(name, partial(_newest, name))
-       for name in ('canonical_state', 'joint_targets', 'joint_states')},
-    **{f'flood of garbage on {name}': _flood(name, _garbage)
-       for name in ('canonical_state', 'joint_targets', 'joint_states')},
+    **{f'flood of old {name}': _flood(name, partial(_newest, name)) for name in TICKED},
+    **{f'flood of garbage on {name}': _flood(name, _garbage) for name in TICKED},
     'parameter events': _events,
     'transitions': _transitions,
     '1,000 rho a second': _parameters(core.CANONICAL, 'rho'),

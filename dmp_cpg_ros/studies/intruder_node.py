@@ -18,6 +18,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
+from std_srvs.srv import SetBool
 
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.values import set_stamp
@@ -25,6 +26,9 @@ from dmp_cpg_ros.suite_table import ROBOT
 
 NAME = 'intruder'
 """Its node; what ``/diagnostics`` must name."""
+
+FLOODED, REJECTED = 'flooded by', 'rejected.'
+"""What reports say of floods, and the name of what they have refused of a topic."""
 
 HEAR_S = 2.0
 """Time after which a topic has nothing to say [s]."""
@@ -55,6 +59,12 @@ class Intruder(Node):  # type: ignore[misc]
         Whether the robot has told a fall.
     sent : int
         Messages and requests so far.
+    refused : dict of (str, str) to int
+        Messages that nodes say they have refused, by node and topic.
+    shutters : set of str
+        Nodes that say they do not receive it any more.
+    stop : Future or None
+        Answer to the stop that was asked for in an attack.
     """
 
     def __init__(self, seed: int) -> None:
@@ -66,6 +76,10 @@ class Intruder(Node):  # type: ignore[misc]
         self.last: dict[str, bytes] = {}
         self.poses: list[Pose] = []
         self.begin, self.named, self.fell, self.sent = nan, nan, False, 0
+        self.refused: dict[tuple[str, str], int] = {}
+        self.shutters: set[str] = set()
+        self.stop: Any = None
+        self._inhibit = self.create_client(SetBool, 'inhibit')
         self._writers: dict[str, Any] = {}
         self._readers: dict[str, Any] = {}
         place = interface('ground_truth')
@@ -100,6 +114,11 @@ class Intruder(Node):  # type: ignore[misc]
         for status in report.status:
             if NAME in status.message and self.named != self.named:
                 self.named = time.monotonic()
+            if FLOODED in status.message and NAME in status.message:
+                self.shutters.add(status.name)
+            self.refused.update(
+                {(status.name, entry.key): int(entry.value) for entry in status.values
+                 if entry.key.startswith(REJECTED)})
             self.fell |= status.name == ROBOT and any(entry.key == 'fell' and entry.value == 'true'
                              for entry in status.values)
 
@@ -170,6 +189,11 @@ class Intruder(Node):  # type: ignore[misc]
     def stamped(self, name: str, stamp_ns: int) -> None:
         """Publish the last message of a topic with another stamp."""
         self.changed(name, lambda message: set_stamp(message.header.stamp, stamp_ns))
+
+    def ask(self, inhibited: bool) -> Any:
+        """Ask for a stop, or for its end, as a user may; returns the answer that is to come."""
+        self._inhibit.wait_for_service(timeout_sec=2.0)
+        return self._inhibit.call_async(SetBool.Request(data=inhibited))
 
     def call(self, kind: Any, name: str, requests: Sequence[Any], rate: float) -> None:
         """Send requests to a service at a rate and do not wait for the answers."""
