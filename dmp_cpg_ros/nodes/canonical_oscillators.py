@@ -105,7 +105,7 @@ class CanonicalOscillators(SuiteNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the oscillators to the stamp of the reference."""
-        if self._memory.awaited(stamp_ns):
+        if self._memory.awaited(stamp_ns, values):
             return
         dt, r = self.elapsed, values['reference']
         force = told_at(stamp_ns, values.get('foot_contacts'), np.full(len(LEGS), np.nan))

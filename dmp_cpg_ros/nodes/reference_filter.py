@@ -58,7 +58,7 @@ class ReferenceFilter(SuiteNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the filter to the stamp of the robot's state."""
-        if self._memory.awaited(stamp_ns):
+        if self._memory.awaited(stamp_ns, values):
             return
         dt, wanted = self.elapsed, self.parameters_of(CanonicalParameters).cadence_scale
         if known := self._memory.take(stamp_ns):

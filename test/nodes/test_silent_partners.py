@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -451,6 +452,34 @@ def test_a_memory_that_does_not_come_is_waited_for_no_longer_than_for_a_while(ro
         if sent:
             break
     assert stamp == TICK + gait_memory.PATIENT_NS
+
+
+@pytest.mark.parametrize('comes', [True, False])
+def test_in_lock_step_the_first_tick_of_who_comes_back_waits_for_the_memory(
+        ros: Ros, monkeypatch: pytest.MonkeyPatch, comes: bool) -> None:
+    """It may be found later than what the tick goes by; who waits in vain goes on from zero."""
+    lock_step = [Parameter('lock_step', value=True)]
+    reference, sent = ReferenceFilter(
+        'reference_filter', context=ros.context, parameter_overrides=lock_step), list[Any]()
+    ros.nodes.append(reference)
+    reference.start()
+    reference._publisher.publish = sent.append  # type: ignore[method-assign]
+    loop, before, tick = walked(750)
+    stamp = before.time_ns + TICK
+    reference.on_tick(stamp, {'joint_states': None, 'inhibition_gains': (stamp, RUNS)})
+    reference._memory._try_again()
+    assert not sent
+    if comes:
+        reference._memory._hear(GaitMemoryWriter(tuple(load_gaits())).fill(
+            before.time_ns, tick.x, tick.x_dot, tick.gait, tick.r))
+    else:
+        later_s = time.monotonic() + gait_memory.LOCK_STEP_S
+        monkeypatch.setattr(time, 'monotonic', lambda: later_s)
+        reference._memory._try_again()
+    assert len(sent) == 1 and header_ns(sent[0]) == stamp
+    assert bool(reference._r.any()) is comes
+    reference._memory._try_again()
+    assert len(sent) == 1
 
 
 def test_gains_of_before_a_clock_that_was_set_back_are_those_of_a_silent_inhibition(ros: Ros

@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from dmp_cpg_ros.core.errors import DataError
@@ -26,6 +28,11 @@ PATIENT_NS = 300_000_000
 latched, and may come after the first tick.
 """
 
+LOCK_STEP_S, LOOK_EVERY_S = 2.0, 0.1
+"""In lock-step, where the robot waits: how long the first tick of a node that may have been
+restarted waits for the memory, and how often it is looked whether that is over [s].
+"""
+
 
 class GaitMemory:
     """Listens for what a node held before it was restarted, until its first tick.
@@ -42,17 +49,40 @@ class GaitMemory:
         """Listen."""
         self._node, self._reader = node, GaitMemoryReader(gaits)
         self._kept: deque[Any] = deque(maxlen=1)
-        self._heard = node.listen('gait_memory', self._kept.append)
+        self._held: tuple[int, dict[str, Any]] | None = None
+        self._heard = node.listen('gait_memory', self._hear)
         self._asked, self._began_ns = False, -1
+        if node.lock_step:
+            self._until_s = inf
+            node.look_every(LOOK_EVERY_S, self._try_again)
         self._fresh_ns = node.return_ns + BLIND_NS if node.return_ns else FRESH_NS
 
-    def awaited(self, stamp_ns: int) -> bool:
-        """Whether nothing is remembered yet that may be; a run's first tick has the stamp 0."""
-        if self._asked or self._kept or not self._node.return_ns or stamp_ns <= 0:
+    def awaited(self, stamp_ns: int, values: dict[str, Any]) -> bool:
+        """Whether nothing is remembered yet that may be; a run's first tick has the stamp 0. In
+        lock-step the node takes the tick as soon as that is over.
+        """
+        if self._asked or self._kept or stamp_ns <= 0:
+            return False
+        if self._node.lock_step:
+            now_s = time.monotonic()
+            self._until_s = min(self._until_s, now_s + LOCK_STEP_S)
+            self._held = (stamp_ns, values) if now_s < self._until_s else None
+            return self._held is not None
+        if not self._node.return_ns:
             return False
         if self._began_ns < 0:
             self._began_ns = stamp_ns
         return stamp_ns - self._began_ns < PATIENT_NS
+
+    def _hear(self, message: Any) -> None:
+        self._kept.append(message)
+        self._try_again()
+
+    def _try_again(self) -> None:
+        """Take the tick that waits, or let it wait on."""
+        held, self._held = self._held, None
+        if held is not None:
+            self._node.on_tick(*held)
 
     def take(self, stamp_ns: int) -> tuple[float, Any] | None:
         """At the first tick: the time since the memory [s] and what it says, if it is of the
