@@ -19,7 +19,7 @@ pytest.importorskip('mujoco')
 
 import numpy as np
 import ros_processes
-from ros_processes import RUN_S, SHARED_HZ, NodeProcess, Processes, Ros
+from ros_processes import RUN_S, SHARED_HZ, NodeProcess, Processes, Ros, wait_until
 from std_srvs.srv import SetBool
 
 from dmp_cpg_ros.analysis.loading import load_recording
@@ -152,6 +152,40 @@ def test_a_node_that_hangs_is_named_and_the_run_has_failed(
     assert process.wait(RUN_S) == 1, str(process)
     # and whoever has not ended either, on a loaded machine
     assert re.search(r'walk: bag_recorder(, \w+)* hung', process.output), process
+
+
+@pytest.mark.parametrize('node', ['leg_transformation_fl', 'posture_control'])
+def test_a_node_that_stands_still_for_a_while_is_followed_again(
+        processes: Processes, tmp_path: Path, node: str) -> None:
+    """As one of a machine that was busy or asleep: what it sends then is late, and no restart."""
+    process = walk(processes, tmp_path, 3600.0, '--rate', str(SHARED_HZ))
+    process.wait_for_output(r's +walking', RUN_S)
+    begin, pid = len(process.output), process.pid_of(node)
+    try:
+        os.kill(pid, signal.SIGSTOP)
+        wait_until(lambda: 'looks after itself' in process.output[begin:], RUN_S,
+                   what=lambda: str(process))
+    finally:
+        os.kill(pid, signal.SIGCONT)
+    wait_until(lambda: re.search(r'(?s)looks after itself.*s +walking', process.output[begin:]),
+               RUN_S, what=lambda: str(process))
+    process.interrupt()
+    assert process.wait(RUN_S) == 130, str(process)
+    assert 'was ended by' not in process.output
+    assert tilt(load_recording(tmp_path / 'run').odometry.quaternion).max() < 0.5
+
+
+def test_in_lock_step_the_walk_waits_for_nodes_that_stand_still(
+        processes: Processes, tmp_path: Path) -> None:
+    process = walk(processes, tmp_path, 4.0, *LOCK_STEP)
+    process.wait_for_output(r's +walking', RUN_S)
+    for node in ('posture_control', 'canonical_oscillators'):
+        pid = process.pid_of(node)
+        os.kill(pid, signal.SIGSTOP)
+        wait_until(lambda pid=pid: ') T ' in Path(f'/proc/{pid}/stat').read_text(), RUN_S)
+        os.kill(pid, signal.SIGCONT)
+    assert process.wait(RUN_S) == 0, str(process)
+    assert_undisturbed(tmp_path / 'run')
 
 
 FAILING = """
