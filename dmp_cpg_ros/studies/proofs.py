@@ -26,7 +26,7 @@ from dmp_cpg_ros.analysis.strict_json import to_json
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.proofs import check_proof, check_step, proof
+from dmp_cpg_ros.core.proofs import check_proof, check_rest, check_step, proof
 from dmp_cpg_ros.studies.certificate_settings import grid, random_setting
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table
 from dmp_cpg_ros.studies.proof_claims import Values, refuted
@@ -88,10 +88,11 @@ def _told(name: str, found: list[tuple[bool, str]]) -> int:
     counts = Counter((certified, bool(text)) for certified, text in found)
     proved, missing, unasked = counts[True, True], counts[True, False], counts[False, True]
     refused = sum(not accepted(text) for _, text in found if text)
-    stepped = sum(bool(text and json.loads(text)['step']) for _, text in found)
+    parts = [json.loads(text) for _, text in found if text]
+    stepped, resting = (sum(bool(part[of]) for part in parts) for of in ('step', 'rest'))
     print(f'{name}: {len(found)} settings, {proved + missing} certified, {proved} of them with a '
-          f'proof, {stepped} with one of the step; {unasked} proofs of others; {refused} proofs '
-          'refused', flush=True)
+          f'proof, {stepped} with one of the step, {resting} with one of its time to rest; '
+          f'{unasked} proofs of others; {refused} proofs refused', flush=True)
     return missing + unasked + refused
 
 
@@ -113,9 +114,12 @@ def accepted(text: str) -> bool:
     """Whether the checkers accept a file, and what it has of the step."""
     try:
         found = json.loads(text, object_pairs_hook=check_proof.once)
-        check_proof.check(found)
-        if found['step']:
-            check_step.check(found)
+        if found['rest']:
+            check_rest.check(found)                  # all of it
+        else:
+            check_proof.check(found)
+            if found['step']:
+                check_step.check(found)
     except REFUSALS:
         return False
     return True

@@ -22,7 +22,7 @@ REFUSALS = (ArithmeticError, LookupError, TypeError, ValueError, RecursionError)
 def damaged(text: str, kind: str, other: str, rng: np.random.Generator) -> str:
     """Text of a proof in which one thing is changed."""
     found = json.loads(text)
-    parts = {name: found[name] for name in ('parameters', 'witnesses', 'rows', 'step')}
+    parts = {name: found[name] for name in ('parameters', 'witnesses', 'rows', 'step', 'rest')}
     return DAMAGES[kind](found, [*_places(parts)], json.loads(other), rng)
 
 
@@ -104,7 +104,7 @@ def _cut(found: Values, places: list[Any], other: Values, rng: np.random.Generat
 
 
 def _exchanged(found: Values, places: list[Any], other: Values, rng: np.random.Generator) -> str:
-    part = str(rng.choice(['parameters', 'witnesses', 'rows', 'step']))
+    part = str(rng.choice(['parameters', 'witnesses', 'rows', 'step', 'rest']))
     return json.dumps({**found, part: other[part]})
 
 
@@ -141,8 +141,8 @@ def forged(p: Values, w: Values, rows: Values, kind: str, rng: np.random.Generat
         stated = {name: sorted(sides) for name, sides in check_proof.rows(p, w).items()}
     except REFUSALS:
         pass
-    return json.dumps({**proof.written(p, w, {}, {}), 'rows': proof.written(p, w, stated, {})[
-        'rows'] if stated is not rows else rows}), w
+    return json.dumps({**proof.written(p, w, {}, {}, {}), 'rows': proof.written(
+        p, w, stated, {}, {})['rows'] if stated is not rows else rows}), w
 
 
 def _small(rng: np.random.Generator, smallest: float = -6.0) -> Fraction:

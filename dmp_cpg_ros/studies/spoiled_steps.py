@@ -15,26 +15,32 @@ import numpy as np
 
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import ExponentialStep
-from dmp_cpg_ros.core.proofs import check_step, proof
+from dmp_cpg_ros.core.proofs import check_proof, check_rest, check_step, proof
+from dmp_cpg_ros.core.proofs.step_proof import rest_proof
 from dmp_cpg_ros.studies.proof_claims import Values
 
-_STATES = 40
+_STATES, _AT_ONCE = 40, 4
 _CLEARLY = 1e-7  # share by which a claim must fail
 
 
 def forged_step(text: str, kind: str, rng: np.random.Generator) -> str:
     """Text of a proof with a false witness of the step, and rows that follow from it."""
     found = json.loads(text)
-    p, xi, w = (check_step.read(of) for of in (
-        found['parameters'], found['witnesses']['xi'], found['step']['witnesses']))
-    rows = check_step.read(found['step']['rows'])
+    p, first, w, rows, rest = (check_proof.read(of) for of in (
+        found['parameters'], found['witnesses'], found['step']['witnesses'], found['step']['rows'],
+        found['rest']))
     STEP_FORGERIES[kind](w, rows, rng)
     try:
-        rows = {name: sorted(sides) for name, sides in check_step.rows(p, xi, w).items()}
+        rows = {name: sorted(sides) for name, sides in check_step.rows(
+            p, first['xi'], w).items()}
     except (ArithmeticError, LookupError, TypeError, ValueError):
         pass
-    return json.dumps({**found, 'step': proof.written({}, {}, {}, {'witnesses': w, 'rows': rows})[
-        'step']})
+    rest = rest_proof(p, first, {'witnesses': w}) or rest
+    if kind == SOONER and rest:
+        bound, longest = rest['step_time_to_rest']
+        rest = {'step_time_to_rest': (bound * Fraction(float(rng.uniform(0.05, 1.0))), longest)}
+    changed = proof.written({}, {}, {}, {'witnesses': w, 'rows': rows}, rest)
+    return json.dumps({**found, 'step': changed['step'], 'rest': changed['rest']})
 
 
 def _small(rng: np.random.Generator) -> Fraction:
@@ -60,18 +66,21 @@ def _smaller_norm(w: Values, rows: Values, rng: np.random.Generator) -> None:
     rows['step_synchronisation'][0] *= share
 
 
+SOONER = 'sooner at rest'
+
 STEP_FORGERIES: dict[str, Callable[[Values, Values, np.random.Generator], None]] = {
     'smaller box of the step': _smaller_box,
     'smaller disc': _smaller_disc,
     'another norm of the step': _other_norm,
     'smaller norm of the step': _smaller_norm,
+    SOONER: lambda w, rows, rng: None,
 }
-"""Changes of the witnesses of the step."""
+"""Changes of the witnesses of the step; the last is one of the time in which it comes to rest."""
 
 
 def refuted_step(text: str, rng: np.random.Generator) -> list[str]:
-    """Claims of the part ``step`` of a proof that some states refute, in floating point and with
-    the program's own step.
+    """Claims of the parts ``step`` and ``rest`` of a proof that some states refute, in floating
+    point and with the program's own step.
     """
     found = json.loads(text)
     p, xi, w, rows = (check_step.read(of) for of in (
@@ -103,7 +112,10 @@ def refuted_step(text: str, rng: np.random.Generator) -> list[str]:
             np.abs(other - inside) / v).max(axis=1) * clearly)),
         'step_synchronisation': all(
             np.all(later <= claimed['step_synchronisation'] * now * clearly + 1e-12)
-            for now, later in zip(before[1:], before[2:], strict=False))}
+            for now, later in zip(before[1:], before[2:], strict=False)),
+        'step_time_to_rest': not found['rest'] or _rests(p, inside[:_AT_ONCE], float(
+            check_proof.read(found['rest'])['step_time_to_rest'][0]
+            - Fraction(found['witnesses']['arming_time'])))}
     return [name for name, holds in claims.items() if not holds]
 
 
@@ -117,18 +129,52 @@ def _inside(u: Array, R: float, rng: np.random.Generator) -> Any:
     return y
 
 
+class _Step:
+    """The program's step of some states at once, (count, N) complex."""
+
+    def __init__(self, p: Values, held: int, count: int) -> None:
+        self.r, self.rho, self.omega = (float(p[name]) for name in ('radius', 'rho', 'omega_max'))
+        gains, K = held * np.array(p['gains'], dtype=float), np.array(p['coupling'], dtype=float)
+        self.M, self.pull = np.diag(K.sum(axis=1) + gains) - K, gains * self.r
+        M: Any = np.kron(np.eye(count), np.kron(self.M, np.eye(2)))
+        self._step = ExponentialStep(
+            -M, np.tile(np.kron(self.pull, [1.0, 0.0]), count), float(check_step.step_of(p)))
+
+    def after(self, y: Any, omega: float) -> Any:
+        """States a step later."""
+        return self._step(y.view(float).ravel(), lambda x: self._own(
+            x.view(complex), omega).view(float)).view(complex).reshape(y.shape)
+
+    def rates(self, y: Any, omega: float) -> Any:
+        """Their rates [1/s]."""
+        return self._own(y, omega) - y @ self.M.T + self.pull
+
+    def _own(self, z: Any, omega: float) -> Any:
+        return (self.rho * (self.r**2 - np.abs(z)**2) - 1j * omega) * z
+
+
 def _stepped(p: Values, y: Any, held: int) -> Any:
     """The program's step of states over r."""
-    r, rho, omega = (float(p[name]) for name in ('radius', 'rho', 'omega_max'))
-    gains = held * np.array(p['gains'], dtype=float)
-    K = np.array(p['coupling'], dtype=float)
-    M = np.diag(K.sum(axis=1) + gains) - K
-    step = ExponentialStep(-np.kron(M, np.eye(2)), np.kron(gains, [r, 0.0]),
-                           float(check_step.step_of(p)))
+    step = _Step(p, held, 1)
+    return np.array([step.after(one[None], step.omega)[0] for one in step.r * y])
 
-    def nonlinear(x: Array) -> Array:
-        z = x.reshape(-1, 2).view(complex)[:, 0]
-        return np.asarray(((rho * (r * r - np.abs(z)**2) - 1j * omega) * z)[:, None].view(
-            float).reshape(x.shape))
 
-    return np.array([step(one.view(float), nonlinear).view(complex) for one in r * y])
+def _rests(p: Values, y: Any, seconds: float) -> bool:
+    """Whether states over r, armed, rest after a time and what it takes to come into C."""
+    step, tick = _Step(p, 1, len(y)), float(p['tick'])
+    slow, alpha_r, slope, at_rest = (float(p[name]) for name in (
+        'omega_armed_min', 'alpha_r', 'omega_slope', 'omega_at_rest'))
+    wait = (2.0 * np.pi - float(check_proof.arc(p))) / slow
+    speed, activity = float(p['armed_speed']) * np.exp(-alpha_r * wait), np.ones(y.shape)
+    fade, swing = (np.exp(-rate * tick) for rate in (alpha_r, float(p['activity_rate'])))
+    y = step.r * y
+    for _ in range(int((seconds - wait) / tick)):
+        omega = min(at_rest + slope * speed, float(p['omega_armed_max']))
+        wanted = np.minimum(1.0, np.abs(step.rates(y, omega) / y) / slow)
+        for _ in range(round(tick / float(check_step.step_of(p)))):
+            y = step.after(y, omega)
+        speed, activity = speed * fade, wanted + (activity - wanted) * swing
+    phases = np.abs(step.rates(y, at_rest + slope * speed) / y).max()
+    return bool(seconds > wait and max(
+        phases / float(check_rest.QUIET), speed / float(check_rest.SLOW),
+        activity.max() / float(check_proof.FEW)) <= 1.0 + _CLEARLY)

@@ -46,7 +46,7 @@ def up(x: F) -> F:
 
 def decay(x: F) -> F:
     """Upper bound of exp(-x), x >= 0."""
-    return up((1 + x / 64 + x * x / 8192)**-64)
+    return up((1 + x / 256 + x * x / 2**17)**-256)
 
 
 def times(M: Any, v: Any) -> list[F]:
@@ -68,9 +68,9 @@ def laplacian(p: Any, held: int) -> list[list[F]]:
 
 def pull(p: Any, u: Any) -> list[F]:
     """What drives u_i outwards on the face u_i of the box, without inhibition."""
-    r, inwards = p['radius'], times(laplacian(p, 0), u)
-    return [p['omega_max'] * r + max(F(0), p['rho'] * (-d * d - 2 * d * c) * (c + d)) - x
-            for d, x in zip(u, inwards, strict=True) for c in [max(-3 * d / 4, -r)]]
+    return [p['omega_max'] * p['radius'] + max(F(0), p['rho'] * (-d * d - 2 * d * c) * (c + d)) - x
+            for d, x in zip(u, times(laplacian(p, 0), u), strict=True) for c in [
+                max(-3 * d / 4, -p['radius'])]]
 
 
 def disagreement(p: Any, xi: Any, b: F) -> list[list[F]]:
@@ -117,16 +117,22 @@ def leads_outwards(p: Any, size: F) -> bool:
         z, a, b, c, strict=True)) > size**2
 
 
-def time_to_rest(p: Any, w: Any, inner: Any, size: F, arc: F) -> F:
+def arc(p: Any) -> F:
+    """Lower bound of the arc of C, 4 asin(r0/2r)."""
+    q = min(F(1), p['region_radius'] / (2 * p['radius']))
+    return 4 * (q + q**3 / 6 + 3 * q**5 / 40 + 5 * q**7 / 112)
+
+
+def time_to_rest(p: Any, w: Any, inner: Any, size: F) -> F:
     """Bound on the time from arming to rest [s]."""
     u, v, rate, r, slow = w['u'], w['v'], w['rate'], p['radius'], p['omega_armed_min']
     own = p['omega_armed_max'] * r + F('0.385') * p['rho'] * r**3
     a = max((own + g * d + sum(row) * (d + max(u))) / x for g, d, row, x in zip(
         p['gains'], u, p['coupling'], v, strict=True))
     e = max(2 * d / x for d, x in zip(u, v, strict=True))
-    wait, activity = (F(710, 113) - arc) / slow, F(1)                          # 355/113 > pi
-    speed = p['armed_speed'] * decay(p['alpha_r'] * wait)
-    drive = up(p['omega_slope'] * r / (rate * min(v)))
+    # 355/113 > pi
+    wait, drive = (F(710, 113) - arc(p)) / slow, up(p['omega_slope'] * r / (rate * min(v)))
+    speed, activity = p['armed_speed'] * decay(p['alpha_r'] * wait), F(1)
     keep, fade, swing = (decay(x * CELL) for x in (rate, p['alpha_r'], p['activity_rate']))
     for k in range(1000):
         lows = [max(x, size - e * y) for x, y in zip(inner, v, strict=True)]
@@ -149,11 +155,10 @@ def rows(p: Any, w: Any) -> dict[str, tuple[F, F]]:
         'u', 'v', 'connectivity', 'D', 'T', 'xi', 'rate', 'half_planes'))
     numbers = sum(coupling, gains + [x for x in p.values() if isinstance(x, F)])
     growth, places = p['rho'] * r**2, r * min(FEW, p['omega_at_rest'] / max(map(sum, coupling)))
-    need(len(p) == 19 and len(w) == 16, 'names')
-    need(min(numbers) >= 0 and max(p['omega_at_rest'], p['omega_armed_max']) <= omega
-         and not any(row[i] for i, row in enumerate(coupling)), 'range')
+    need(len(p) == 19 and len(w) == 16 and min(numbers) >= 0 == sum(row[i] for i, row in enumerate(
+        coupling)) and omega >= max(p['omega_at_rest'], p['omega_armed_max']), 'range')
     found: Any = {'premises': (F(0), sum(numbers)), 'synchronisation': (growth, b)}
-    need(min(D) >= 0 < min(xi) and sum(xi) == 1 and disagreement(p, xi, b) == [
+    need(min(D) >= 0 < min(xi) and sum(xi) == 1 == T[-1][-1] and disagreement(p, xi, b) == [
         times(T, [x * d for x, d in zip(row, D, strict=True)]) for row in T], 'factors')
     need(pull(p, u) == w['pull'] and all(
         d == r0 if gain else d == 2 * r or x <= 0 <= d - r0 - places
@@ -182,24 +187,21 @@ def rows(p: Any, w: Any) -> dict[str, tuple[F, F]]:
     found['time_step'] = max(tick * mild / F('1.4'), tick**3 * mild**4 / 40 / slowest), F(1)
     found['cycle_radius'] = least(w['cycle_error'], lambda x: x >= 0 and leads_outwards(
         p, r - r * x) and not leads_outwards(p, r + r * x)), min(FEW, (r0 / r)**2)
-    q = min(F(1), r0 / (2 * r))
-    arc = 4 * (q + q**3 / 6 + 3 * q**5 / 40 + 5 * q**7 / 112)              # below 4 asin q
-    found['region_per_tick'] = omega * tick, arc
+    found['region_per_tick'] = omega * tick, arc(p)
     found['reference'], found['transformation'] = (F(0), rates[0]), (F(0), rates[3])
     found['hierarchy'] = F(0), 1 / sum(1 / x for x in rates)
     found['rest_posture'] = p['clearance'] * FEW, F(1, 100)
     arming = least(w['arming_time'], lambda x: x >= 0 and p['armed_speed'] >= p[
         'foot_speed'] * decay(p['alpha_r'] * x))
-    found['time_to_rest'] = arming + time_to_rest(p, w, inner, size, arc), F(10)
+    found['time_to_rest'] = arming + time_to_rest(p, w, inner, size), F(10)
     return found
 
 
 def check(proof: Any) -> dict[str, tuple[F, F]]:
     """Return both sides of every inequality; raise an error unless the proof is one."""
-    need(len(proof) == 5 and proof['format'] == 'dmp_cpg_ros proof 3', 'format')
     found = rows(read(proof['parameters']), read(proof['witnesses']))
-    need(read(proof['rows']) == {name: list(sides) for name, sides in found.items()} and all(
-        left < right for left, right in found.values()), 'rows')
+    need(proof['format'] == 'dmp_cpg_ros proof 4' and len(proof) == 6 and read(proof['rows']) == {
+        x: [*pair] for x, pair in found.items()} and all(a < b for a, b in found.values()), 'rows')
     return found
 
 
@@ -209,7 +211,8 @@ def once(pairs: Any) -> dict[str, Any]:
     return dict(pairs)
 
 
-if __name__ == '__main__':
+def run(check: Any) -> None:
+    """Check the file that a script is given, and end with what became of it."""
     try:
         need(os.path.isfile(sys.argv[1]), 'there is no such file, or it is a pipe or a device')
         with open(sys.argv[1], encoding='utf-8') as file:
@@ -217,3 +220,7 @@ if __name__ == '__main__':
     except Exception as error:  # noqa: BLE001 - whatever goes wrong, it is no proof
         print(f'{" ".join(sys.argv[1:]) or "no file"} is refused: {error!r:.200}', file=sys.stderr)
         sys.exit(2 if isinstance(error, OSError) or not os.path.isfile([*sys.argv, ''][1]) else 1)
+
+
+if __name__ == '__main__':
+    run(check)

@@ -1,33 +1,20 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """Check what ``certify --proof FILE`` wrote of the step that runs, in exact arithmetic;
-``python3 check_step.py FILE`` needs nothing of the package. It is about the part ``step`` alone:
-check_proof.py checks the others. doc/certificate.md has the format and the reasons.
+``python3 check_step.py FILE`` needs nothing of the package but check_proof.py beside it. It is
+about the part ``step`` alone. doc/certificate.md has the format and the reasons.
 """
 
-import json
-import os
-import sys
 from fractions import Fraction as F  # noqa: N817 - the file is read more than any other
 from typing import Any
 
-GRID, TINY, ONE, FEW, DIGITS = F(1, 2**40), F(1, 2**80), 2**400, F(0.02), 1000
+if __package__:
+    from dmp_cpg_ros.core.proofs.check_proof import need, read, run
+else:
+    from check_proof import need, read, run  # type: ignore[import-not-found, no-redef]
+
+GRID, TINY, ONE, FEW = F(1, 2**40), F(1, 2**80), 2**400, F(0.02)
 QUICKEST, FARTHEST, STEPS = F('2.5'), F('1.29'), 200           # of omega, of r, in a second
-
-
-def need(holds: bool, what: str) -> None:
-    """Refuse what does not hold."""
-    if not holds:
-        raise ValueError(what)
-
-
-def read(value: Any) -> Any:
-    """Fractions of strings, which must be in lowest terms."""
-    if isinstance(value, (list, dict)):
-        return [*map(read, value)] if type(value) is list else {x: read(value[x]) for x in value}
-    need(isinstance(value, str) and len(value) < DIGITS and not value.strip('-/0123456789')
-         and str(F(value)) == value, f'{value!r:.80} is no fraction')
-    return F(value)
 
 
 def root(square: F) -> F:
@@ -146,15 +133,36 @@ def stepped(at: Any, u: Any, c: Any, *off: Any) -> tuple[list[F], list[F], list[
     return a, b, total((T, u), (C, c), (C_y, y), (C_a, off[1](a)), (C_b, off[2](b)))
 
 
-def size(p: Any, held: int, of: Any, w: F, R: F) -> tuple[list[Any], F]:
-    """Bounds of the step; what |y| and its stages do not pass, over r, in a disc that is kept."""
+def size(p: Any, held: int, of: Any, w: F, R: F) -> tuple[Any, F]:
+    """Bounds of the step with and without shift; what |y| and its stages do not pass, over r, in a
+    disc that is kept.
+    """
     g, pull = step_of(p) * p['rho'] * p['radius']**2, [step_of(p) * held * a for a in p['gains']]
     at, plain = (moduli(matrices(of, shift), w) for shift in (2 * g, F(0)))
     strong, radial = (lambda u, x=x: [x * g] * len(u) for x in (2, (FARTHEST**2 - 1) * FARTHEST))
     need(1 <= R >= max(stepped(at, [R] * len(pull), pull, *[strong] * 3)[2]), 'disc')
     a, b, _ = stepped(plain, [R] * len(pull), pull, *[radial] * 3)
     need(max(R, *a, *b) <= FARTHEST, 'stages')
-    return at, max(R, *a, *b)
+    return (at, plain), max(R, *a, *b)
+
+
+def boxed(p: Any, both: Any, u: Any, w: F, far: F) -> tuple[list[F], list[F], list[F]]:
+    """Distances from x_d over r, of the stages of a box and after the step."""
+    (at, plain), c, g = both, [w] * len(u), step_of(p) * p['rho'] * p['radius']**2
+    radial = g * max(F('0.385'), (far**2 - 1) * far)
+    other = stepped(plain, u, c, *[lambda u: [radial] * len(u)] * 3)[1]
+    a, b, last = stepped(at, u, c, *[lambda u: shifted(g, u, far)] * 2, lambda u: shifted(
+        g, [*map(min, u, other)], far))
+    return a, [*map(min, b, other)], last
+
+
+def captured(p: Any, s: Any) -> tuple[Any, ...]:
+    """Functions of the inhibited step, what |y| does not pass over r, the box, its stages, and
+    where it ends.
+    """
+    w, of = step_of(p) * p['omega_max'], phi_of(p, 1)
+    both, near = size(p, 1, of, w, s['disc'])
+    return of, near, s['box'], *boxed(p, both, s['box'], w, near)
 
 
 def gram(of: Polynomial, xi: Any) -> list[Any]:
@@ -189,15 +197,14 @@ def lipschitz(shift: F, g: F, u: Any, far: F) -> Any:
 
 def rows(p: Any, xi: Any, s: Any) -> dict[str, tuple[F, F]]:
     """Both sides of the inequalities of the step."""
-    h, r0, gains, u, v = step_of(p), p['region_radius'] / p['radius'], p['gains'], s['box'], s['v']
+    h, r0, gains, v = step_of(p), p['region_radius'] / p['radius'], p['gains'], s['v']
     g, w, (shift, loose) = h * p['rho'] * p['radius']**2, h * p['omega_max'], s['shifts']
     most, rates = max(map(sum, p['coupling'])), [*gains, *sum(p['coupling'], []), p['rho']]
     need(min(*rates, w, p['omega_at_rest'], shift, loose, 1 - shift, 1 - loose, 1 - 2 * g,
              1 - QUICKEST * w, min(v) - GRID, min(xi) - F(1, 2**256), 16 - len(xi),
              2**16 - h * sum(rates)) >= 0 and sum(xi) == 1 and len(s) == 5, 'range')
     _, far = size(p, 0, free := phi_of(p, 0), QUICKEST * w, s['disc'])
-    at, near = size(p, 1, held := phi_of(p, 1), w, s['disc'])
-    a, b, last = stepped(at, u, [w] * len(u), *[lambda u: shifted(g, u, near)] * 3)
+    held, near, u, a, b, last = captured(p, s)
     entry = r0 + min(FEW, p['omega_at_rest'] / most)
     need(all(d == r0 if gain else d >= min(s['disc'] + 1, max(x, entry))
              for d, x, gain in zip(u, last, gains, strict=True)), 'box')
@@ -221,17 +228,5 @@ def check(proof: Any) -> dict[str, tuple[F, F]]:
     return found
 
 
-def once(pairs: Any) -> dict[str, Any]:
-    """Names and values as a dictionary, if no name is there twice."""
-    need(len(dict(pairs)) == len(pairs), 'a name twice')
-    return dict(pairs)
-
-
 if __name__ == '__main__':
-    try:
-        need(os.path.isfile(sys.argv[1]), 'there is no such file, or it is a pipe or a device')
-        with open(sys.argv[1], encoding='utf-8') as file:
-            print('accepted:', *check(json.loads(file.read(2**20), object_pairs_hook=once)))
-    except Exception as error:  # noqa: BLE001 - whatever goes wrong, it is no proof
-        print(f'{" ".join(sys.argv[1:]) or "no file"} is refused: {error!r:.200}', file=sys.stderr)
-        sys.exit(2 if isinstance(error, OSError) or not os.path.isfile([*sys.argv, ''][1]) else 1)
+    run(check)

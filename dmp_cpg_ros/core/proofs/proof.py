@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.contraction.synchronisation import cascade_weights, slowes
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.proofs import check_proof as exact
-from dmp_cpg_ros.core.proofs.step_proof import step_proof
+from dmp_cpg_ros.core.proofs.step_proof import rest_proof, step_proof
 
 Values = dict[str, Any]
 
@@ -67,8 +67,8 @@ def proof_of(s: Setting) -> Values:
     for regional, slower in product(reaches, _SLOWER):
         try:
             w = completed(p, _chosen(p, analysis, shares, regional, slower))
-            proof = written(p, w, exact.rows(p, w), step_proof(
-                p, w['xi'], stepped_network(s, analysis)))
+            step = step_proof(p, w['xi'], stepped_network(s, analysis))
+            proof = written(p, w, exact.rows(p, w), step, rest_proof(p, w, step))
             exact.check(proof)
             return proof
         except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
@@ -76,10 +76,10 @@ def proof_of(s: Setting) -> Values:
     raise ParameterError(f'no exact proof is found: {reason}')
 
 
-def written(p: Values, w: Values, rows: Values, step: Values) -> Values:
+def written(p: Values, w: Values, rows: Values, step: Values, rest: Values) -> Values:
     """Parameters, witnesses, rows and what is proved of the step as they stand in a file."""
-    return {'format': 'dmp_cpg_ros proof 3', 'parameters': _written(p),
-            'witnesses': _written(w), 'rows': _written(rows), 'step': _written(step)}
+    return {'format': 'dmp_cpg_ros proof 4', 'parameters': _written(p), 'witnesses': _written(w),
+            'rows': _written(rows), 'step': _written(step), 'rest': _written(rest)}
 
 
 def _parameters(s: Setting, analysis: NetworkAnalysis) -> Values:
@@ -146,9 +146,9 @@ def completed(p: Values, chosen: Values) -> Values:
     far = max((z[0] - r)**2 + z[1]**2 for z, gain in zip(y_fast, p['gains'], strict=True)
               if gain > 0)
     size = min(z[0]**2 + z[1]**2 for z in y_rest)
-    # Where the lower bound (1 + x/64 + x²/8192)^64 of the exponential reaches the ratio.
+    # Where the lower bound (1 + x/256 + x²/2^17)^256 of the exponential reaches the ratio.
     ratio = float(foot / armed) if foot else 1.0
-    logarithm = 64.0 * (math.sqrt(2.0 * ratio**(1.0 / 64.0) - 1.0) - 1.0)
+    logarithm = 256.0 * (math.sqrt(2.0 * ratio**(1.0 / 256.0) - 1.0) - 1.0)
     return {
         'connectivity': b, 'xi': xi, 'T': T, 'D': D, 'u': u, 'pull': exact.pull(p, u),
         'half_planes': [[c, s, h, sine, exact.plane_rates(p, u, c, s, h)]

@@ -1,7 +1,7 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """Exact witnesses of what a certificate says of the step that runs, for
-:mod:`~dmp_cpg_ros.core.proofs.check_step`.
+:mod:`~dmp_cpg_ros.core.proofs.check_step` and :mod:`~dmp_cpg_ros.core.proofs.check_rest`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.certificates.step import SteppedNetwork
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.proofs import check_rest
 from dmp_cpg_ros.core.proofs import check_step as exact
 
 Values = dict[str, Any]
@@ -44,15 +45,33 @@ def step_proof(p: Values, xi: list[Fraction], found: SteppedNetwork | None) -> V
         left < right for left, right in rows.values()) else {}
 
 
+def rest_proof(p: Values, w: Values, step: Values) -> Values:
+    """Row of the time in which the step comes to rest; empty where it is not proved.
+
+    Parameters
+    ----------
+    p, w : dict
+        Parameters and witnesses of a proof, as fractions.
+    step : dict
+        From :func:`step_proof`.
+    """
+    try:
+        bound = check_rest.time_to_rest(p, w, step['witnesses'])
+    except (ArithmeticError, LookupError, ValueError):
+        return {}
+    return {'step_time_to_rest': (bound, check_rest.LONGEST)} if (
+        bound < check_rest.LONGEST) else {}
+
+
 def _witnesses(p: Values, xi: list[Fraction], found: SteppedNetwork) -> Values:
     h, r, w = exact.step_of(p), p['radius'], exact.step_of(p) * p['omega_max']
     g, free, held = h * p['rho'] * r * r, exact.phi_of(p, 0), exact.phi_of(p, 1)
     quick, pull = exact.QUICKEST * w, _float([h * gain for gain in p['gains']])
     disc = _up(max(1.0, _disc(free, g, quick, 0.0 * pull), _disc(held, g, w, pull)))
     _, far = exact.size(p, 0, free, quick, disc)
-    at, near = exact.size(p, 1, held, w, disc)
-    u = _box(p, at, g, w, disc, near, found.distance)
-    reached = [*_after(at, g, w, u, near)[:2], u]
+    both, near = exact.size(p, 1, held, w, disc)
+    u = _box(p, both, g, w, disc, near, found.distance)
+    reached = [*exact.boxed(p, both, u, w, near)[:2], u]
     inner = max(0.0, 1.0 - float(max(map(max, reached))))
     shift = _up(0.5 * float(g) * (3.0 * min(2.0 - inner, float(near))**2 - 2.0 + inner**2))
     loose = _up(float(g) * (1.5 * float(far)**2 - 1.0))
@@ -67,22 +86,17 @@ def _disc(of: Any, g: Fraction, w: Fraction, pull: Array) -> float:
     return float((pushed / kept).max()) if kept.min() > 0.0 else np.inf
 
 
-def _after(at: list[Any], g: Fraction, w: Fraction, u: list[Fraction], far: Fraction) -> Any:
-    """Distances from x_d over r, of the stages and after a step out of a box."""
-    return exact.stepped(at, u, [w] * len(u), *[lambda u: exact.shifted(g, u, far)] * 3)
-
-
-def _box(p: Values, at: list[Any], g: Fraction, w: Fraction, disc: Fraction, far: Fraction,
+def _box(p: Values, both: Any, g: Fraction, w: Fraction, disc: Fraction, far: Fraction,
          distance: Array) -> list[Fraction]:
     """Box of shares of r that free nodes do not leave, enlarged from one."""
     held, edge = np.array([gain > 0 for gain in p['gains']]), disc + 1
     r0 = p['region_radius'] / p['radius']
-    T, C_y, C_a, C_b = (_float(X) for X in at[:4])
+    T, C_y, C_a, C_b = (_float(X) for X in both[0][:4])
     J = T + (C_y + C_a + C_b) * 2.0 * float(g)
     u = [r0 if leg else min(edge, _up(d)) for leg, d in zip(
         held, (distance / float(p['radius'])).tolist(), strict=True)]
     for _ in range(_MOST_TRIALS):
-        over = _float(_after(at, g, w, u, far)[2]) - _float(u)
+        over = _float(exact.boxed(p, both, u, w, far)[2]) - _float(u)
         moving = np.flatnonzero(~held & np.array([x < edge for x in u]))
         if np.all(over[moving] <= 0.0):
             break

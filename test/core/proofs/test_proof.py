@@ -14,7 +14,7 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from itertools import count
+from itertools import count, islice
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -33,11 +33,12 @@ from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.maths.exponential import phi_functions
-from dmp_cpg_ros.core.proofs import check_proof, check_step
-from dmp_cpg_ros.core.proofs.proof import proof_of
+from dmp_cpg_ros.core.proofs import check_proof, check_rest, check_step
+from dmp_cpg_ros.core.proofs.proof import completed, proof_of, written
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 P = suite_parameters()
+CHECKERS = (check_proof, check_step, check_rest)
 
 
 def running(gait: GaitNetwork, inhibition: InhibitionParameters = P.inhibition,
@@ -187,15 +188,14 @@ def test_mutated_proofs_are_refused() -> None:
     originals = [proof(network()), proof(network('trot', coupling_graph='directed_ring')),
                  proof(*regional[:3])]
     for original in originals:
-        check_proof.check(original)
-        if original['step']:
-            check_step.check(original)
+        checkers = [check_proof, *[check_step] * bool(original['step']),
+                    *[check_rest] * bool(original['rest'])]
+        checkers[-1].check(original)
         for _ in range(80):
             changed = mutated(original, rng)
             with pytest.raises((ArithmeticError, LookupError, TypeError, ValueError)):
-                check_proof.check(changed)
-                if original['step']:
-                    check_step.check(changed)
+                for checker in checkers[-1:] if original['rest'] else checkers:
+                    checker.check(changed)
 
 
 @pytest.mark.parametrize(('name', 'value'), [
@@ -229,14 +229,54 @@ def test_the_step_of_every_gait_has_a_proof_that_says_what_certify_does(gait: st
         assert rate == pytest.approx(certificate[name].right, rel=slower)
 
 
+@pytest.mark.parametrize('gait', GAITS)
+@pytest.mark.parametrize('tick', [0.001, TICK, 0.01])
+def test_the_stop_that_is_stated_is_proved_for_the_step(gait: str, tick: float) -> None:
+    certificate = certify(running(network(gait), tick=tick))
+    bound, longest = check_rest.check(proof(network(gait), tick=tick))['step_time_to_rest']
+    assert longest == 10 and 0.98 * certificate.time_to_rest < float(bound) <= 1.0001 * (
+        certificate.time_to_rest)
+
+
+def test_proved_times_to_rest_are_never_far_above_those_that_are_stated() -> None:
+    shares = []
+    for gait, inhibition, tick, certificate in islice(settings(count(), (5.0, 100.0)), 20):
+        found = proof(gait, inhibition, tick)
+        if found['rest']:
+            shares.append(float(check_rest.check(found)['step_time_to_rest'][0])
+                          / certificate.time_to_rest)
+    assert len(shares) > 15 and max(shares) < 1.01
+
+
+@pytest.mark.parametrize(('name', 'worse'), [
+    ('alpha_r', Fraction(1, 2)), ('activity_rate', Fraction(1, 8)), ('omega_slope', 40),
+    ('armed_speed', Fraction(1, 9)), ('omega_armed_min', Fraction(1, 4)), ('foot_speed', 40)])
+def test_a_time_to_rest_is_not_accepted_for_parameters_that_make_it_longer(
+        name: str, worse: Fraction) -> None:
+    found = proof(network())
+    stated = check_rest.check(found)['step_time_to_rest'][0]
+    p, w, s = (check_proof.read(of) for of in (
+        found['parameters'], found['witnesses'], found['step']['witnesses']))
+    p[name] *= worse
+    w = completed(p, w)
+    assert check_rest.time_to_rest(p, w, s) > stated
+    changed = {**written(p, w, check_proof.rows(p, w), {}, {}), **{
+        part: found[part] for part in ('step', 'rest')}}
+    check_proof.check(changed)
+    check_step.check(changed)
+    with pytest.raises(ValueError, match='rest'):
+        check_rest.check(changed)
+
+
 def test_a_setting_whose_step_is_not_proved_has_a_proof_without_it() -> None:
     for gait, inhibition, tick, certificate in settings(count(), (1.5, 8.0)):
         if certificate['time_step'].required:
             found = proof(gait, inhibition, tick)
             check_proof.check(found)
-            assert found['step'] == {}
-            with pytest.raises(LookupError):
-                check_step.check(found)
+            assert found['step'] == found['rest'] == {}
+            for checker in (check_step, check_rest):
+                with pytest.raises(LookupError):
+                    checker.check(found)
             return
 
 
@@ -267,24 +307,29 @@ def test_the_functions_of_the_step_are_exact_far_beyond_what_is_added() -> None:
             assert np.abs(other - full[0]).max() < check_step.ONE >> 350
 
 
-@pytest.mark.parametrize('checker', [check_proof, check_step])
+@pytest.mark.parametrize('checker', CHECKERS)
 def test_a_checker_can_be_read_at_a_sitting(checker: ModuleType) -> None:
     path = Path(str(checker.__file__))
     assert code_lines(path) <= 150
     text = path.read_text(encoding='utf-8')
     imported = re.findall(r'^(?:import|from) (\w+)', text, re.MULTILINE)
-    assert set(imported) == {'json', 'os', 'sys', 'fractions', 'typing'}
+    own = {path.stem for path in path.parent.glob('check_*.py')} | {'dmp_cpg_ros'}
+    assert set(imported) - own <= {'json', 'os', 'sys', 'fractions', 'typing'}
+    packaged = re.findall(r'dmp_cpg_ros\.core\.proofs(?:\.(\w+))? import (.*)', text)
+    assert all(set((name or names).split(', ')) <= own for name, names in packaged)
 
 
-@pytest.mark.parametrize('checker', [check_proof, check_step])
+@pytest.mark.parametrize('checker', CHECKERS)
 def test_a_checker_is_a_script_of_its_own(checker: ModuleType, tmp_path: Path) -> None:
-    path, script = tmp_path / 'proof.json', tmp_path / 'checker.py'
-    script.write_bytes(Path(str(checker.__file__)).read_bytes())
+    path, script = tmp_path / 'proof.json', tmp_path / Path(str(checker.__file__)).name
+    for each in CHECKERS:                            # beside each other, and nothing else
+        (tmp_path / Path(str(each.__file__)).name).write_bytes(
+            Path(str(each.__file__)).read_bytes())
     found = proof(network())
     path.write_text(json.dumps(found), encoding='utf-8')
 
     def status(arguments: Sequence[str] = (str(path),)) -> int:
-        ended = subprocess.run([sys.executable, '-I', str(script), *arguments],
+        ended = subprocess.run([sys.executable, '-E', '-S', str(script), *arguments],
                                capture_output=True, text=True, check=False)
         assert (ended.stdout + ended.stderr).count('\n') == 1
         return ended.returncode
