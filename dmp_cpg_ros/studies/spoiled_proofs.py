@@ -138,7 +138,7 @@ def forged(p: Values, w: Values, rows: Values, kind: str, rng: np.random.Generat
         after(w)
     stated: Values = rows
     try:
-        stated = {name: sorted(sides) for name, sides in check_proof.rows(p, w).items()}
+        stated = {name: sorted(sides) for name, sides in check_proof.rows(p, w, True).items()}
     except REFUSALS:
         pass
     return json.dumps({**proof.written(p, w, {}, {}, {}), 'rows': proof.written(

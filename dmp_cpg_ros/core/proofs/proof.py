@@ -30,7 +30,7 @@ from dmp_cpg_ros.core.proofs.step_proof import rest_proof, step_proof
 Values = dict[str, Any]
 
 _ROUNDING = 1e-9  # share that is given away, so that rounding does not decide
-_SLOWER = (1e-4, 0.1, 0.3, 0.5)  # shares of the rate that are given away for weights more even
+_SLOWER = (1e-4, 0.05, 0.1, 0.2, 0.3, 0.5)  # shares of the rate given away for more even weights
 _MOST_STEPS = 10_000  # of the grid, from a guess
 _CASCADE = 2.0**-64  # weight of a component of a graph, as a share of those before it
 
@@ -62,13 +62,15 @@ def proof_of(s: Setting) -> Values:
     p = _parameters(s, analysis)
     shares = cascade_weights(s.network.system.graph, _CASCADE) if (
         analysis.found.weights is None) else analysis.found.weights
-    reason = 'it does not contract'
+    reason, step = 'it does not contract', None
     reaches = (False, True) if analysis.contraction.reach == GLOBAL else (True,)
     for regional, slower in product(reaches, _SLOWER):
         try:
             w = completed(p, _chosen(p, analysis, shares, regional, slower))
-            step = step_proof(p, w['xi'], stepped_network(s, analysis))
-            proof = written(p, w, exact.rows(p, w), step, rest_proof(p, w, step))
+            if step is None:
+                step = step_proof(p, w['xi'], stepped_network(s, analysis))
+            rest = rest_proof(p, w, step)
+            proof = written(p, w, exact.rows(p, w, not rest), step, rest)
             exact.check(proof)
             return proof
         except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:

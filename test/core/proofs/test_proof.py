@@ -85,16 +85,16 @@ def settings(seeds: Iterable[int], share: tuple[float, float]
 
 @pytest.mark.parametrize('gait', GAITS)
 def test_every_gait_has_a_proof_of_every_inequality(gait: str) -> None:
-    found = check_proof.check(proof(network(gait)))
+    found = check_rest.check(proof(network(gait)))
     certificate = certify(running(network(gait)))
-    assert set(found) == {row.name for row in certificate.inequalities if row.required} - {
-        *STEP_ROWS} | {'premises', 'time_step'}
+    assert set(found) == {
+        f'step_{row.name}' if row.name == 'time_to_rest' else row.name
+        for row in certificate.inequalities if row.required} | {
+            'premises', 'step_premises', 'time_step'}
     assert float(found['synchronisation'][1]) == pytest.approx(
         certificate['synchronisation'].right, rel=1e-6)
     assert float(found['capture'][0]) == pytest.approx(
         certificate['capture'].left / certificate['capture'].right, rel=1e-6)
-    assert certificate.time_to_rest <= float(found['time_to_rest'][0]) < 1.5 * (
-        certificate.time_to_rest)
 
 
 def test_random_certified_settings_have_proofs() -> None:
@@ -260,7 +260,7 @@ def test_a_time_to_rest_is_not_accepted_for_parameters_that_make_it_longer(
     p[name] *= worse
     w = completed(p, w)
     assert check_rest.time_to_rest(p, w, s) > stated
-    changed = {**written(p, w, check_proof.rows(p, w), {}, {}), **{
+    changed = {**written(p, w, check_proof.rows(p, w, False), {}, {}), **{
         part: found[part] for part in ('step', 'rest')}}
     check_proof.check(changed)
     check_step.check(changed)
