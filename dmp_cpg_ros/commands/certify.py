@@ -207,8 +207,8 @@ def _parser() -> argparse.ArgumentParser:
     add('--robot', metavar='FILE', help='robot file instead of the one that the file names')
     add('--json', action='store_true', help='print JSON instead of a table')
     add('--proof', metavar='FILE', type=Path,
-        help='write witnesses that check_proof.py and, of the step that runs, check_step.py '
-        'check exactly, when it holds')
+        help='write witnesses that check_proof.py and, of the step that runs, check_step.py and '
+        'check_rest.py check exactly, when it holds')
     add('--suggest', action='store_true', help='propose coupling and inhibition gains that hold')
     return parser
 
