@@ -13,7 +13,7 @@ pytest.importorskip('mujoco')  # the robot's geometry is read from its model
 
 from dmp_cpg_ros.commands.certify import main
 from dmp_cpg_ros.configuration import find_config
-from dmp_cpg_ros.core.proofs.check_proof import check
+from dmp_cpg_ros.core.proofs.check_rest import check
 
 
 def file_with(folder: Path, **changes: object) -> str:
@@ -133,7 +133,7 @@ def test_a_proof_is_written_where_one_exists(tmp_path: Path,
                                              capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / 'proof.json'
     assert main(['--proof', str(path)]) == 0
-    assert 'time_to_rest' in check(json.loads(path.read_text(encoding='utf-8')))
+    assert 'step_time_to_rest' in check(json.loads(path.read_text(encoding='utf-8')))
     assert main([file_with(tmp_path, voting='true'), '--proof', str(path)]) == 2
     assert 'voting' in capsys.readouterr().err
     assert main(['--proof', str(tmp_path)]) == 2

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import ast
 import subprocess
+import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -64,7 +65,7 @@ def imports(module: str, path: Path, *, at_import_time: bool = False) -> set[str
     """Full names of all modules that a module imports.
 
     With ``at_import_time`` only those that run when the module is imported: none inside functions
-    or under ``if TYPE_CHECKING``.
+    or under ``if TYPE_CHECKING``. What a script imports from beside it is a module of the package.
     """
     tree = ast.parse(path.read_text(encoding='utf-8'))
     names: set[str] = set()
@@ -73,7 +74,12 @@ def imports(module: str, path: Path, *, at_import_time: bool = False) -> set[str
             names.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             names.update(_from_names(node, module, path))
-    return names
+    return {f'{module.rpartition(".")[0]}.{name}' if _beside(name, path) else name
+            for name in names}
+
+
+def _beside(name: str, path: Path) -> bool:
+    return name not in sys.stdlib_module_names and path.with_name(f'{name}.py').is_file()
 
 
 def _from_names(node: ast.ImportFrom, module: str, path: Path) -> set[str]:
