@@ -129,7 +129,7 @@ def _inside(u: Array, R: float, rng: np.random.Generator) -> Any:
     return y
 
 
-class _Step:
+class StepOfStates:
     """The program's step of some states at once, (count, N) complex."""
 
     def __init__(self, p: Values, held: int, count: int) -> None:
@@ -155,13 +155,13 @@ class _Step:
 
 def _stepped(p: Values, y: Any, held: int) -> Any:
     """The program's step of states over r."""
-    step = _Step(p, held, 1)
+    step = StepOfStates(p, held, 1)
     return np.array([step.after(one[None], step.omega)[0] for one in step.r * y])
 
 
 def _rests(p: Values, y: Any, seconds: float) -> bool:
     """Whether states over r, armed, rest after a time and what it takes to come into C."""
-    step, tick = _Step(p, 1, len(y)), float(p['tick'])
+    step, tick = StepOfStates(p, 1, len(y)), float(p['tick'])
     slow, alpha_r, slope, at_rest = (float(p[name]) for name in (
         'omega_armed_min', 'alpha_r', 'omega_slope', 'omega_at_rest'))
     wait = (2.0 * np.pi - float(check_proof.arc(p))) / slow

@@ -37,6 +37,7 @@ from dmp_cpg_ros.core.proofs import check_proof, check_rest, check_step
 from dmp_cpg_ros.core.proofs.proof import completed, proof_of, written
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.studies.certificate_settings import random_setting
+from dmp_cpg_ros.studies.spoiled_steps import StepOfStates
 
 P = suite_parameters()
 CHECKERS = (check_proof, check_step, check_rest)
@@ -261,6 +262,35 @@ def test_a_time_to_rest_is_not_accepted_for_parameters_that_make_it_longer(
     check_step.check(changed)
     with pytest.raises(ValueError, match='rest'):
         check_rest.check(changed)
+
+
+def test_steps_from_the_box_keep_the_bounds_that_a_time_to_rest_is_made_of() -> None:
+    """Of what is moved, of rates and of another frequency; halved, each of them fails."""
+    rng = np.random.default_rng(4)
+    close = np.zeros(4)
+    for gait, inhibition, tick, _ in islice(settings(count(), (5.0, 100.0)), 6):
+        found = proof(gait, inhibition, tick)
+        if not found['rest']:
+            continue
+        p, s = (check_proof.read(of) for of in (found['parameters'], found['step']['witnesses']))
+        Z, P, S, G, Y, near = (np.array(of, dtype=float) for of in check_rest.falling(p, s))
+        h, r, omega = (float(x) for x in (check_step.step_of(p), p['radius'], p['omega_max']))
+        u = np.minimum(np.array(s['box'], dtype=float), 0.3)
+        y = 1.0 + u * rng.random((12, 4)) * np.exp(2j * np.pi * rng.random((12, 4)))
+        y /= np.maximum(np.abs(y), 1.0)
+        step = StepOfStates(p, 1, len(y))
+        after, slower = (step.after(r * y, at) / r for at in (omega, 0.97 * omega))
+        moved = np.abs(after - y)
+        c, later = (h / r * np.abs(step.rates(r * x, omega)) for x in (y, after))
+        twice = np.abs(step.after(r * after, omega) / r - after)
+        for k, (what, bound) in enumerate([
+                (twice, moved @ Z.T), (later, moved @ P.T + c @ S.T), (moved, c @ G.T),
+                (np.abs(after - slower), 0.03 * omega * h * Y)]):
+            share = float((what / bound).max())
+            assert share <= 1.0 + 1e-9
+            close[k] = max(close[k], share)
+        assert np.abs(after).max() <= near
+    assert close.min() > 0.5
 
 
 def test_a_slow_leg_behind_quick_ones_has_a_proof() -> None:
