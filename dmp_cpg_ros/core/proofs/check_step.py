@@ -122,6 +122,11 @@ def shifted(g: F, u: Any, far: F) -> list[F]:
         m := 3 * z * z - 2 * z - 2 * y, -m * (z > -1))) for y, z in d]
 
 
+def radial(g: F, far: Any) -> list[F]:
+    """Largest h rho |r^2 - |y|^2||y|/r, |y| <= far r."""
+    return [g * max(F('0.385'), (x * x - 1) * x) for x in far]
+
+
 def stepped(at: Any, u: Any, c: Any, *off: Any) -> tuple[list[F], list[F], list[F]]:
     """What distances or differences u, and c that is constant, become in the stages and the step;
     off makes of those of y, a and b what h Q is.
@@ -139,9 +144,9 @@ def size(p: Any, held: int, of: Any, w: F, R: F) -> tuple[Any, F]:
     """
     g, pull = step_of(p) * p['rho'] * p['radius']**2, [step_of(p) * held * a for a in p['gains']]
     at, plain = (moduli(matrices(of, shift), w) for shift in (2 * g, F(0)))
-    strong, radial = (lambda u, x=x: [x * g] * len(u) for x in (2, (FARTHEST**2 - 1) * FARTHEST))
-    need(1 <= R >= max(stepped(at, [R] * len(pull), pull, *[strong] * 3)[2]), 'disc')
-    a, b, _ = stepped(plain, [R] * len(pull), pull, *[radial] * 3)
+    need(1 <= R >= max(stepped(at, [R] * len(pull), pull, *[lambda u: [2 * g] * len(u)] * 3)[2]),
+         'disc')
+    a, b, _ = stepped(plain, [R] * len(pull), pull, *[lambda u: radial(g, u)] * 3)
     need(max(R, *a, *b) <= FARTHEST, 'stages')
     return (at, plain), max(R, *a, *b)
 
@@ -149,8 +154,7 @@ def size(p: Any, held: int, of: Any, w: F, R: F) -> tuple[Any, F]:
 def boxed(p: Any, both: Any, u: Any, w: F, far: F) -> tuple[list[F], list[F], list[F]]:
     """Distances from x_d over r, of the stages of a box and after the step."""
     (at, plain), c, g = both, [w] * len(u), step_of(p) * p['rho'] * p['radius']**2
-    radial = g * max(F('0.385'), (far**2 - 1) * far)
-    other = stepped(plain, u, c, *[lambda u: [radial] * len(u)] * 3)[1]
+    other = stepped(plain, u, c, *[lambda u: radial(g, [far] * len(u))] * 3)[1]
     a, b, last = stepped(at, u, c, *[lambda u: shifted(g, u, far)] * 2, lambda u: shifted(
         g, [*map(min, u, other)], far))
     return a, [*map(min, b, other)], last
