@@ -90,6 +90,7 @@ def time_to_rest(p: Any, w: Any, s: Any) -> F:
     h, r, u, R, tick, slow = check_step.step_of(p), p['radius'], s['box'], s['disc'], p['tick'], p[
         'omega_armed_min']
     y, _, error = w['equilibria'][1]
+    check_proof.need(F(1, 10**4) <= tick <= F(1, 10), 'tick')
     check_proof.need(all((x - r)**2 + z**2 <= (d * r - v * error)**2 and d * r >= v * error
                          for (x, z), d, v in zip(y, u, w['v'], strict=True)), 'rest')
     size = (w['rest_size'] - max(w['v']) * error) / r * UNIT // 1
@@ -108,8 +109,7 @@ def time_to_rest(p: Any, w: Any, s: Any) -> F:
             return w['arming_time'] + wait + (k + 6) * tick
         wanted, away = min(F(1), phase / slow), whole(h * p['omega_slope'] * speed)
         activity = check_proof.up(wanted + max(F(0), activity - wanted) * swing)
-        speed = check_proof.up(speed * fade)
-        turn = max(0, away - h * p['omega_slope'] * speed * UNIT // 1)
+        speed, turn = check_proof.up(speed * fade), whole(away * p['alpha_r'] * tick / UNIT)
         for last in [0] * (round(tick / h) - 1) + [turn]:
             c = [x + times(last, near) for x in total((P, m), (S, c))]
             m = [x + times(last, y) for x, y in zip(total((Z, m)), Y, strict=True)]

@@ -228,10 +228,10 @@ def test_the_step_of_every_gait_has_a_proof_that_says_what_certify_does(gait: st
         certificate.time_to_rest)
     length = tick / max(1, round(tick / 0.005))
     farthest, r0 = map(float, found['step_capture'])
-    assert farthest / r0 == pytest.approx(certificate['step_capture'].left, rel=0.02)
-    for name, slower in (('step_contraction', 0.06), ('step_synchronisation', 0.06)):
+    assert farthest / r0 == pytest.approx(certificate['step_capture'].left, rel=1e-3)
+    for name in ('step_contraction', 'step_synchronisation'):
         rate = -np.log(float(found[name][0])) / length
-        assert rate == pytest.approx(certificate[name].right, rel=slower)
+        assert rate == pytest.approx(certificate[name].right, rel=0.01)
 
 
 def test_proved_times_to_rest_are_never_far_above_those_that_are_stated() -> None:
