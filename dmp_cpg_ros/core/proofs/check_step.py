@@ -181,15 +181,19 @@ def gram(of: Polynomial, xi: Any) -> list[Any]:
 
 def norm(of: Polynomial, xi: Any, w: F, most: F) -> F:
     """Return a bound of what a polynomial makes of differences between nodes, if it is one."""
-    first, *more = gram(of, xi)
+    first, odd, second, *more = gram(of, xi)
     spare = most * most - sum(w**m * root(sum(F(x * x, ONE**2) / (a * b) for a, row in zip(
-        xi, K, strict=True) for b, x in zip(xi, row, strict=True))) for m, K in enumerate(more, 1))
-    S = [[spare * x * ((i == j) - y) - F(K, ONE) + x * y for j, (y, K) in enumerate(zip(
-        xi, row, strict=True))] for i, (x, row) in enumerate(zip(xi, first, strict=True))]
-    while S:                                                     # positive, by elimination
-        (pivot, *top), *rest = S
-        need(pivot > 0, 'norm')
-        S = [[x - row[0] * y / pivot for x, y in zip(row[1:], top, strict=True)] for row in rest]
+        xi, K, strict=True) for b, x in zip(xi, row, strict=True))) for m, K in (
+            (1, odd), *enumerate(more, 3)))
+    for turned in (F(0), w * w):                                 # and so between them
+        S = [[spare * x * ((i == j) - y) - (K + turned * k) / ONE + x * y for j, (y, K, k) in
+              enumerate(zip(xi, *both, strict=True))] for i, (x, *both) in enumerate(
+                  zip(xi, first, second, strict=True))]
+        while S:                                                 # positive, by elimination
+            (pivot, *top), *rest = S
+            need(pivot > 0, 'norm')
+            S = [[x - row[0] * y / pivot for x, y in zip(row[1:], top, strict=True)]
+                 for row in rest]
     return most + GRID
 
 

@@ -117,11 +117,12 @@ def _perron(Z: Array) -> list[Fraction]:
 def _norm(of: exact.Polynomial, xi: list[Fraction], w: Fraction) -> Fraction:
     """Norm of differences between nodes, a little above it."""
     root = np.sqrt(_float(xi))
-    first, *more = (_float(K) / exact.ONE for K in exact.gram(of, xi))
-    scaled = first / np.outer(root, root)
-    top = float(np.linalg.eigvalsh(0.5 * (scaled + scaled.T))[-1])
-    rest = sum(float(w)**m * float(np.linalg.norm(K / np.outer(root, root)))
-               for m, K in enumerate(more, 1))
+    first, odd, second, *more = (_float(K) / exact.ONE / np.outer(root, root)
+                                 for K in exact.gram(of, xi))
+    top = max(float(np.linalg.eigvalsh(0.5 * (K + K.T))[-1])
+              for K in (first, first + float(w)**2 * second))
+    rest = sum(float(w)**m * float(np.linalg.norm(K)) for m, K in (
+        (1, odd), *enumerate(more, 3)))
     return _up(float(np.sqrt(max(top, 0.0) + rest)) + 1e-9)
 
 
