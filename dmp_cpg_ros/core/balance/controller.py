@@ -183,8 +183,10 @@ class PostureController:
         """
         p, leg_length = self.parameters, self.scale.leg_length
         stride = self._stride(memory.activity, gait, x, x_dot, r, dt)
+        R_world_base = vec3.rotation(state.base_quaternion.tolist())
         R_ground_base, upward = ground_from_base(
-            state, p.slope_following * memory.terrain.followed)
+            R_world_base, state.ground_normal_in_world,
+            p.slope_following * memory.terrain.followed)
         felt = state.felt_legs
         if felt is not None:
             if state.feels_nothing:
@@ -208,8 +210,10 @@ class PostureController:
         acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
         lasting = integral.lasting(p, leg_length, plan)
         error = (measured[0] - (planned[0] - lasting[0]), measured[1] - (planned[1] - lasting[1]))
+        forces = believed(state.foot_force)
         terrain, level = self._ground(
-            memory, state, R_ground_base[2], legs, stride, gait, measured, dt)
+            memory, state, forces, R_world_base, R_ground_base[2], legs, stride, gait, measured,
+            dt)
         return PostureState(stride.activity, integral, plan, offset, terrain), PostureFeedback(
             self._torque(body, legs, feet, stride, planned, self._bounce(gait, stride),
                          acceleration),
@@ -217,7 +221,7 @@ class PostureController:
             np.array(self.placement.drift(
                 self.placement.yielding(p, stride.reference[0], gait.firm), measured, planned,
                 stride.activity.tolist(), sway.velocity)),
-            np.array(correction), command, state.joint_position, believed(state.foot_force),
+            np.array(correction), command, state.joint_position, forces,
             self._margins(R_ground_base, feet, stride, under, error),
             Progress((measured[0], measured[1]), feet_behind(
                 plan.expected, beside, feet, self._footholds, stride.positions, stride.duty,
@@ -268,7 +272,8 @@ class PostureController:
         return np.array([part for (x, y), up in zip(shift, raised, strict=True)
                          for part in (x, y, up)]).reshape(-1, 3)
 
-    def _ground(self, memory: PostureState, state: RobotState, normal_in_base: Triple,
+    def _ground(self, memory: PostureState, state: RobotState, forces: Array,
+                R_world_base: Matrix, normal_in_base: Triple,
                 legs: Sequence[tuple[Triple, Matrix]], stride: Stride, gait: GaitInForce,
                 measured: Triple, dt: float) -> tuple[Terrain, tuple[float, ...]]:
         """Memory of the ground, and heights of the feet over the plane with a normal that the body
@@ -277,19 +282,18 @@ class PostureController:
         """
         if not self.parameters.climbing:
             return NOTHING_FELT, LEVEL_FEET
-        R_world_base = vec3.rotation(state.base_quaternion.tolist())
         place = vec3.triple(state.base_position_in_world.tolist())
         n = vec3.times(R_world_base, normal_in_base)
+        speed = self.scale.foot_speed(*measured)
         limit = SLOW * self.scale.speed(gait.highest(self.scale))
         calm = (gait.firm >= 1.0 and abs(vec3.dot(n, vec3.times(R_world_base, LEFT))) < ROLLING
-                and all(self.scale.foot_speed(*velocity) < limit
-                        for velocity in (stride.reference, measured)))
+                and speed < limit and self.scale.foot_speed(*stride.reference) < limit)
         swung = [position / (1.0 - stride.duty) + 0.5 for position in stride.positions]
         touches, rests = contacts(
-            state, [resting(*of) for of in zip(
+            state, forces, [resting(*of) for of in zip(
                 stride.activity.tolist(), memory.activity.tolist(), strict=True)],
             legs, self._quarter_weight)
-        quiet = self.scale.foot_speed(*measured) < self.scale.speed(QUIET)
+        quiet = speed < self.scale.speed(QUIET)
         return memory.terrain.felt(
             place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot, _ in legs],
             n, swung, touches, self.scale.leg_length, calm,

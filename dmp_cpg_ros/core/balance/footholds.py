@@ -29,7 +29,6 @@ from dmp_cpg_ros.core.maths import Array, clamped, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Pair, Triple
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
-from dmp_cpg_ros.core.robot_model.state import RobotState
 
 LARGEST_RAISE = 0.35
 """Largest correction of a swinging foot's height by levelling, in leg lengths."""
@@ -255,13 +254,16 @@ def _on_own_side(y: float, place: float) -> float:
     return -place if inside else y
 
 
-def ground_from_base(state: RobotState, following: float = 1.0) -> tuple[Matrix, Triple]:
+def ground_from_base(R_world_base: Matrix, normal_in_world: Array | None, following: float = 1.0
+                     ) -> tuple[Matrix, Triple]:
     """Rotation from ``base_link`` to the frame of the ground, and the vertical in that frame.
 
     Parameters
     ----------
-    state : RobotState
-        Orientation of the base, and the normal of the ground where it is known.
+    R_world_base : tuple of rows
+        Orientation of the base.
+    normal_in_world : ndarray (3,) or None
+        Of the ground, where it is known.
     following : float
         Share of a steep slope that the frame takes; 0 is level. Of a slope s it takes this times
         s²/(s² + ``SLIGHT``²).
@@ -273,11 +275,10 @@ def ground_from_base(state: RobotState, following: float = 1.0) -> tuple[Matrix,
     upward_in_ground : tuple of float
         Direction away from gravity.
     """
-    R_world_base = vec3.rotation(state.base_quaternion.tolist())
-    normal, vertical = state.ground_normal_in_world, R_world_base[2]
-    if normal is None or following == 0.0:
+    vertical = R_world_base[2]
+    if normal_in_world is None or following == 0.0:
         return vec3.heading_frame(vertical), (0.0, 0.0, 1.0)
-    x, y, z = normal.tolist()
+    x, y, z = normal_in_world.tolist()
     x, y = x / z, y / z
     squared = x * x + y * y
     share = following * squared / (squared + SLIGHT**2)

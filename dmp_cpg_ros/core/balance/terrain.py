@@ -51,8 +51,8 @@ from collections.abc import Sequence
 from math import dist, exp
 from typing import NamedTuple
 
-from dmp_cpg_ros.core.gait.contact_feedback import LOADED, UNLOADED, believed
-from dmp_cpg_ros.core.maths import vec3
+from dmp_cpg_ros.core.gait.contact_feedback import LOADED, UNLOADED
+from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, dot
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
@@ -239,8 +239,9 @@ class Terrain(NamedTuple):
                 heights, lowered, rests, swung, touches, strict=True))
 
 
-def contacts(state: RobotState, rests: Sequence[bool], legs: Sequence[tuple[Triple, Matrix]],
-             quarter: float) -> tuple[list[bool], list[bool]]:
+def contacts(state: RobotState, forces: Array, rests: Sequence[bool],
+             legs: Sequence[tuple[Triple, Matrix]], quarter: float
+             ) -> tuple[list[bool], list[bool]]:
     """Which feet touch something as their sensors tell, and which legs rest without a doubt of it:
     one whose joints press on the ground while its sensor tells nothing has a sensor that is dead.
 
@@ -248,6 +249,8 @@ def contacts(state: RobotState, rests: Sequence[bool], legs: Sequence[tuple[Trip
     ----------
     state : RobotState
         Measured.
+    forces : ndarray (4,)
+        Of the feet, those that can be believed [N].
     rests : sequence of four bool
         Which legs rest; their feet touch with less than one that comes down.
     legs : sequence of (foot_in_base, jacobian_in_base)
@@ -255,15 +258,15 @@ def contacts(state: RobotState, rests: Sequence[bool], legs: Sequence[tuple[Trip
     quarter : float
         A quarter of the robot's weight [N].
     """
-    told, efforts = state.foot_force.tolist(), state.joint_effort.tolist()
-    forces = believed(state.foot_force).tolist()
+    told, efforts, known = (
+        of.tolist() for of in (state.foot_force, state.joint_effort, forces))
     touches = [force > (UNLOADED if rest else LOADED) * quarter
-               for force, rest in zip(forces, rests, strict=True)]
+               for force, rest in zip(known, rests, strict=True)]
     return touches, [
         rest and force == said and (touch or pressure(jacobian, efforts[3 * i:3 * i + 3])
                                     < LOADED * quarter)
         for i, (rest, force, said, touch, (_, jacobian)) in enumerate(
-            zip(rests, forces, told, touches, legs, strict=True))]
+            zip(rests, known, told, touches, legs, strict=True))]
 
 
 def pressure(jacobian: Matrix, efforts: Sequence[float]) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from dmp_cpg_ros.core.estimation.velocity_filter import GYRO_BIAS, TILT, VELOCITY
 from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.records import made_often
+from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
@@ -37,6 +38,8 @@ class BodyEstimate:
         Orientation of ``base_link``, x, y, z, w; yaw is 0 where the robot was switched on.
     velocity_in_base, rate_in_base : ndarray (3,)
         [m/s], [rad/s]
+    velocity_in_world : tuple of float
+        The same velocity [m/s].
     height : float
         Of ``base_link`` over the ground under the stance feet, along its normal [m].
     normal_in_world : ndarray (3,)
@@ -61,6 +64,7 @@ class BodyEstimate:
     quaternion: Array
     velocity_in_base: Array
     rate_in_base: Array
+    velocity_in_world: Triple
     height: float
     normal_in_world: Array
     trust: Array

@@ -217,14 +217,14 @@ class BodyEstimator:
         depths = [z for (_, _, z), stand in zip(contact, stands, strict=True) if stand]
         height = -sum(depths) / len(depths) if depths else 0.0
         position, way = np.array((0.0, 0.0, height)), 0.0
+        velocity = vec3.times(R, vec3.triple(state.velocity_in_base.tolist()))
         if before is not None:
             last = before.estimate
-            gone = 1e-9 * (readings.time_ns - last.time_ns) * np.array(
-                vec3.times(R, vec3.triple(state.velocity_in_base.tolist())))
+            gone = 1e-9 * (readings.time_ns - last.time_ns) * np.array(velocity)
             position, way = last.position_in_world + gone, last.way + float(np.linalg.norm(gone))
         estimate = BodyEstimate(
             readings.time_ns, position, state.quaternion,
-            state.velocity_in_base, rate, height,
+            state.velocity_in_base, rate, velocity, height,
             np.array(normal_in_world(flat.slope)), np.array(trust), covariance,
             self.parameters.gyro_noise**2 / BLIND, way, _problems(readings))
         feet = tuple((x, y, z + height if stand else 0.0)
@@ -285,8 +285,7 @@ class BodyEstimator:
         dt = time_step(last.time_ns, time_ns)
         R = vec3.rotation(state.quaternion.tolist())
         v = vec3.times(R, vec3.triple(state.velocity_in_base.tolist()))
-        u = vec3.times(vec3.rotation(last.quaternion.tolist()),
-                       vec3.triple(last.velocity_in_base.tolist()))
+        u = last.velocity_in_world
         velocity = 0.5 * (v[0] + u[0]), 0.5 * (v[1] + u[1]), 0.5 * (v[2] + u[2])
         position = vec3.moved(vec3.triple(last.position_in_world.tolist()), velocity, dt)
         contact = [vec3.times(R, place) for place in motion.contact_in_base]
@@ -302,7 +301,7 @@ class BodyEstimator:
             height += share * (measured - height)
         return terrain, BodyEstimate(
             time_ns, np.array(position), state.quaternion, state.velocity_in_base,
-            rate - state.gyro_bias, height, np.array(normal), np.array(trust),
+            rate - state.gyro_bias, v, height, np.array(normal), np.array(trust),
             state.covariance, rate_noise, last.way + hypot(*velocity) * dt, problems)
 
 

@@ -33,6 +33,7 @@ from dmp_cpg_ros.core.balance.terrain import (
     contacts,
     pressure,
 )
+from dmp_cpg_ros.core.gait.contact_feedback import believed
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 
@@ -238,7 +239,7 @@ def test_foot_that_presses_on_the_ground_and_tells_nothing_does_not_hang(
     effort[:3] = np.array(legs[0][1]).T @ (0.0, 0.0, -load)   # τ = Jᵀ f of what the foot presses
     assert pressure(legs[0][1], effort[:3].tolist()) == pytest.approx(load)
     state = replace(state, foot_force=force, joint_effort=effort)
-    assert contacts(state, RESTING, legs, 20.0) == (
+    assert contacts(state, force, RESTING, legs, 20.0) == (
         [force[0] > 2.0, True, True, True], [rests, True, True, True])
     broken = replace(state, foot_force=np.array((np.nan, 20.0, 20.0, 20.0)))
-    assert contacts(broken, RESTING, legs, 20.0)[1][0] is False
+    assert contacts(broken, believed(broken.foot_force), RESTING, legs, 20.0)[1][0] is False
