@@ -39,6 +39,7 @@ from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode
 from dmp_cpg_ros.nodes.messages.robot_state import RobotStateWriter
 from dmp_cpg_ros.nodes.messages.values import set_stamp, stamp_ns
 from dmp_cpg_ros.process import end_with_parent
+from dmp_cpg_ros.robot.drive_watch import DriveWatch
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.port import Robot, RobotError
@@ -379,15 +380,11 @@ class MujocoRobotNode(DrivenRobot):
 
     # Inside --------------------------------------------------------------------------------------
 
-    @property
-    def has_drives(self) -> bool:
-        """Joints that are exactly where they are told to be need none."""
-        return self._options.physics == 'mujoco'
-
-    @property
-    def cuts_power(self) -> bool:
-        """As the enable lines of real drives do, whatever these are told."""
-        return self.has_drives
+    def prepare_watch(self, drives: DriveWatch) -> None:
+        """Joints that are exactly where they are told to be have no drives; others lose their
+        power as by the enable lines of real drives, whatever these are told.
+        """
+        drives.watches = drives.cuts = self._options.physics == 'mujoco'
 
     @property
     def _file(self) -> Path:

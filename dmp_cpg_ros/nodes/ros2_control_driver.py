@@ -43,6 +43,7 @@ from dmp_cpg_ros.nodes.messages.robot_state import (
     read_orientation,
 )
 from dmp_cpg_ros.nodes.messages.values import checked, header_ns, sensed
+from dmp_cpg_ros.robot.drive_watch import DriveWatch
 from dmp_cpg_ros.robot.joint_drive import JointDrive
 from dmp_cpg_ros.robot.watchdog import CARRIED_NS
 from dmp_cpg_ros.suite_table import DRIVER, KINDS
@@ -127,20 +128,13 @@ class Ros2ControlDriver(DrivenRobot):
         self._enabled = self._commanding = False
         self.destroy_timer(self._timer)
 
-    @property
-    def keeps_velocity(self) -> bool:
-        """Whether motors take a velocity beside the angle, with each command."""
-        return {'position', 'velocity'} <= set(self._joint_publishers)
-
-    @property
-    def cuts_power(self) -> bool:
-        """Whether drives have an interface for that: what they are told else they may not do."""
-        return POWER in self._joint_publishers
-
-    @property
-    def acts_late_ns(self) -> int:
-        """As late as targets are borne: commands go over topics and a bus."""
-        return CARRIED_NS
+    def prepare_watch(self, drives: DriveWatch) -> None:
+        """Motors may take a velocity beside the angle, with each command, as late as targets are
+        borne, for commands go over topics and a bus; they lose power where they have an interface
+        for that: what they are told else they may not do.
+        """
+        drives.keeps_velocity = {'position', 'velocity'} <= set(self._joint_publishers)
+        drives.late_ns, drives.cuts = CARRIED_NS, POWER in self._joint_publishers
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Timing, and whether the joints are commanded and follow the legs."""

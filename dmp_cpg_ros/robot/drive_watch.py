@@ -131,12 +131,8 @@ class DriveWatch:
             self._before.clear()
             return
         dt, q, q_dot = 1e-9 * after_ns, state.joint_position, state.joint_velocity
-        position, velocity, effort = told
-        plain = (self._kp * (position + dt * velocity - q) + self._kd * (self._goes - q_dot)
-                 + effort)
         news, given, fade = self._news, state.joint_effort / self._limit, exp(-dt / MEMORY_S)
-        news[0], news[1] = plain, plain + self._damping * self._goes
-        asked = self._limited(news[:2], q_dot) / self._limit
+        asked = self._asked(told[0] + dt * told[1] - q, told[2], self._goes, q_dot)
         if self.late_ns:
             asked[:] = self._nearest(given, asked, state)
         news[:2], news[2], news[3] = asked, self._damping * q_dot / self._limit, given
@@ -157,6 +153,14 @@ class DriveWatch:
         lately = now - self._failed_ns < WELL_NS
         self.failing = tuple(name for name, of in zip(self._names, lately, strict=True) if of)
 
+    def _asked(self, ahead: Array, effort: Array, goes: Array, q_dot: Array) -> Array:
+        """Torques, in limits, that the drives give by both laws for angles that are ahead of them,
+        efforts and velocities to follow, each (..., 12): ndarray (2, ..., 12).
+        """
+        plain = self._kp * ahead + self._kd * (goes - q_dot) + effort
+        return np.asarray(self._limited(
+            np.array((plain, plain + self._damping * goes)), q_dot) / self._limit)
+
     def _nearest(self, given: Array, asked: Array, state: RobotState) -> Array:
         """What is nearest to the torques that are given, (12,), between those that are asked for,
         (2, 12), and those that older targets ask for.
@@ -165,11 +169,9 @@ class DriveWatch:
             self._before.popleft()
         if self._before:
             told, goes = (np.array(rows) for rows in list(zip(*self._before, strict=True))[1:])
-            plain = (self._kp * (told[:, 0] - state.joint_position)
-                     + self._kd * (goes - state.joint_velocity) + told[:, 2])
-            older = np.concatenate([plain, plain + self._damping * goes])
-            asked = np.concatenate([
-                asked, self._limited(older, state.joint_velocity) / self._limit])
+            older = self._asked(told[:, 0] - state.joint_position, told[:, 2], goes,
+                                state.joint_velocity)
+            asked = np.concatenate([asked, *older])
         return np.asarray(np.clip(given, asked.min(axis=0), asked.max(axis=0)))
 
     def _watch_legs(self, now: int) -> None:

@@ -20,6 +20,7 @@ from dmp_cpg_ros.nodes.framework.known_stop import KnownStop
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES, JointTargetsReader
 from dmp_cpg_ros.nodes.messages.values import header_ns
+from dmp_cpg_ros.robot.drive_watch import DriveWatch
 from dmp_cpg_ros.robot.target_loss import BORNE
 from dmp_cpg_ros.robot.watchdog import CARRIED_NS, CommandWatchdog
 
@@ -59,30 +60,11 @@ class DrivenRobot(SuiteNode):
                                       round(p.target_lead * 1e9),
                                       self.parameters_of(TickParameters).tick_ns
                                       if self.lossy else 0, self.return_ns)
-        self._guard.drives.watches = self.has_drives
-        self._guard.drives.keeps_velocity = self.keeps_velocity
-        self._guard.drives.late_ns = self.acts_late_ns
-        self._guard.drives.cuts = self.cuts_power
+        self.prepare_watch(self._guard.drives)
 
-    @property
-    def has_drives(self) -> bool:
-        """Whether something moves the joints whose torques tell how it does."""
-        return True
-
-    @property
-    def keeps_velocity(self) -> bool:
-        """Whether the drives are told velocities at a rate of their own."""
-        return False
-
-    @property
-    def acts_late_ns(self) -> int:
-        """Age of the oldest targets by which the drives may still act [ns]."""
-        return 0
-
-    @property
-    def cuts_power(self) -> bool:
-        """Whether it takes the power from the drives of lame legs."""
-        return False
+    def prepare_watch(self, drives: DriveWatch) -> None:
+        """Tell the watch what is known of the drives; joints without any are not watched."""
+        raise NotImplementedError
 
     def watchdog_values(self) -> dict[str, Any]:
         """What ``/diagnostics`` tells of the watchdog."""
@@ -147,7 +129,7 @@ class DrivenRobot(SuiteNode):
             self.clear('joints')
             return
         lame = self._guard.drives.lame
-        cut = f', and {", ".join(lame)} is without power' if self.cuts_power else ''
+        cut = f', and {", ".join(lame)} is without power' if self._guard.drives.cuts else ''
         rest = f'; the robot lowers itself onto its belly{cut}' if lame else ''
         self.warn('joints', f'joint {", ".join(failing)} does not follow: the torque that its '
                   f'drive reports is not what its targets ask for{rest}', error=True)
