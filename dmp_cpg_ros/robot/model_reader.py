@@ -17,6 +17,7 @@ from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot import model_parts
+from dmp_cpg_ros.robot.leg_width import leg_widths
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_parts import ModelIds, foot_position
 from dmp_cpg_ros.robot.mujoco_import import mujoco
@@ -126,8 +127,9 @@ def read_description(model: mujoco.MjModel, file: RobotFile) -> RobotDescription
     radius = standing_radius(model, standing, ids)
     legs = tuple(
         replace(leg, foot_radius=leg.foot_radius if radius is None else radius,
-                swing_inertia=float(joint_inertia[hip, hip]))
-        for leg, hip in zip(legs, joints.reshape(4, 3)[:, 1], strict=True))
+                swing_inertia=float(joint_inertia[hip, hip]), width=width)
+        for leg, hip, width in zip(legs, joints.reshape(4, 3)[:, 1],
+                                   leg_widths(model, standing, ids), strict=True))
     legs = with_rolling_radii(replace(description, legs=legs), model, ids)
     return replace(description, legs=legs, base_inertia=inertia, com_in_base=com, kd=kd)
 

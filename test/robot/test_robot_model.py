@@ -256,3 +256,21 @@ def test_a_model_that_has_changed_since_it_was_read_is_read_again(tmp_path):
             masses.append(load_description(file).mass)
             assert load_description(file).mass == masses[-1]
         assert masses[1] - masses[0] == pytest.approx(1.0)
+
+
+def test_legs_are_as_wide_as_the_shapes_with_which_they_can_touch():
+    """The package's own robot has legs that pass through each other; then its fore legs touch the
+    hind ones, but one of the left side is told not to.
+    """
+    file = load_robot_file(own_robot_file())
+    model = load_model(file.model, file.base)
+    ids = find_ids(model, file)
+    assert all(leg.width == 0.0 for leg in read_description(model, file).legs)
+    shanks = model.jnt_bodyid[ids.joints[2::3]]
+    model.geom_conaffinity[np.isin(model.geom_bodyid, [*shanks, *(f.body for f in ids.feet)])] = 1
+    widths = [leg.width for leg in read_description(model, file).legs]
+    assert widths == pytest.approx([2.0 * max(foot.radius for foot in ids.feet)] * 4, rel=0.3)
+    for foot in ids.feet:
+        model.geom_contype[list(foot.geoms)] = model.geom_conaffinity[list(foot.geoms)] = 0
+    thinner = [leg.width for leg in read_description(model, file).legs]
+    assert all(thin <= wide for thin, wide in zip(thinner, widths, strict=True))

@@ -48,6 +48,7 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 from dmp_cpg_ros.core.transformation.foot_path import activities_step, resting
+from dmp_cpg_ros.core.transformation.lanes import Lanes
 from dmp_cpg_ros.core.transformation.leg import body_scale, nominal_foothold
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
@@ -135,6 +136,7 @@ class PostureController:
         footholds = np.array([nominal_foothold(description, leg.name) for leg in description.legs])
         self.model = VirtualModel(description, self.scale.leg_length)
         self.placement = FootPlacement(self.kinematics, footholds, self.scale.leg_length)
+        self.lanes = Lanes(description)
         self._across: list[float] = footholds[:, 1].tolist()
         self._nominal = [vec3.triple(foot) for foot in footholds.tolist()]
         self._footholds = [
@@ -206,7 +208,8 @@ class PostureController:
         legs = self.legs.at(state.joint_position.tolist())
         com = vec3.plus(self._com_in_base, (*offset.place, 0.0))
         feet = [vec3.times(R_ground_base, vec3.minus(foot, com)) for foot, _ in legs]
-        body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, stride.load))
+        body = BodyMotion(R_ground_base, upward, velocity, rate,
+                          self.foot_radius - virtual_model.ground_height(feet, stride.load))
         acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
         lasting = integral.lasting(p, leg_length, plan)
         error = (measured[0] - (planned[0] - lasting[0]), measured[1] - (planned[1] - lasting[1]))
@@ -265,9 +268,11 @@ class PostureController:
         """Shift of the footholds of swinging feet, ndarray (4, 3) [m]."""
         p, (beside_x, beside_y) = self.parameters, beside
         caught = self.placement.caught(measured, planned, gait.apart)
+        lanes = self.lanes.aside(gait, stride.reference[0], stride.omega, stride.duty)
         shift = [
-            (along + beside_x, across + beside_y) for along, across in self.placement.shift(
-                p, caught, planned, pi * stride.duty / stride.omega)]
+            (along + beside_x, across + (beside_y + aside)) for (along, across), aside in zip(
+                self.placement.shift(p, caught, planned, pi * stride.duty / stride.omega), lanes,
+                strict=True)]
         raised = self.placement.raised(p, shift, R_ground_base)
         return np.array([part for (x, y), up in zip(shift, raised, strict=True)
                          for part in (x, y, up)]).reshape(-1, 3)
@@ -311,14 +316,6 @@ class PostureController:
             places.append(vec3.moved(foot, vec3.minus(place, foot), swing))
         return support_margins(
             places, under, error, self.model.height, self.parameters.friction, self._room)
-
-    def _height(self, feet: list[Triple], load: list[float]) -> float:
-        """Height of the centre of mass over the ground under the feet that carry [m]."""
-        total, heights = sum(load), [z for _, _, z in feet]
-        if total <= 1e-6:
-            return self.foot_radius - min(heights)
-        carried = sum(share * z for share, z in zip(load, heights, strict=True))
-        return self.foot_radius - carried / total
 
     def _bounce(self, gait: GaitInForce, stride: Stride) -> Bounce:
         """Planned bounce of the body: what the legs give way to, in the mean."""

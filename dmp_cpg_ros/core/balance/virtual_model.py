@@ -162,6 +162,27 @@ def contact_weights(cycle_position: Sequence[float], duty: float, activity: Sequ
     return weights
 
 
+def ground_height(feet: Sequence[Triple], load: Sequence[float]) -> float:
+    """Height of the feet that carry, by what they carry in shares; of the lowest where none does.
+
+    Parameters
+    ----------
+    feet : sequence of n tuples of float
+        Places [m].
+    load : sequence of n floats
+        As from :func:`contact_weights`.
+
+    Returns
+    -------
+    float
+        [m]
+    """
+    total, heights = sum(load), [z for _, _, z in feet]
+    if total <= 1e-6:
+        return min(heights)
+    return sum(share * z for share, z in zip(load, heights, strict=True)) / total
+
+
 REGULARISATION = 1e-4
 """Damping of the least squares, relative to the mean of the weights; keeps one or two stance
 feet well posed.

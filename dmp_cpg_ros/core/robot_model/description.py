@@ -49,6 +49,9 @@ class LegGeometry:
     swing_inertia : float
         Of the leg about its hip joint while the robot stands, with the rotor [kg m^2]; 0 where it
         is not known.
+    width : float
+        Of the lower leg, across the body, while the robot stands [m]; 0 where the legs of one side
+        cannot touch each other.
     """
 
     name: str
@@ -67,6 +70,7 @@ class LegGeometry:
     damping: Array = field(default_factory=lambda: np.zeros(3))
     swing_inertia: float = 0.0
     rolling_radius: tuple[float, float] | None = None
+    width: float = 0.0
 
     @property
     def walking_radius(self) -> float:
