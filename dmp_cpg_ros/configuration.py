@@ -316,6 +316,23 @@ def node_parameters(content: Mapping[str, Any], node_name: str, path: str | Path
     return {name: value for values in matching for name, value in values.items()}
 
 
+def misspelt_sections(path: str | Path, name: str, names: Collection[str]) -> list[str]:
+    """Sections of a parameter file that mean none of some nodes, but are nearest to one of them.
+
+    Parameters
+    ----------
+    path : str or Path
+        Parameter file.
+    name : str
+        Of the one node, without its namespace.
+    names : collection of str
+        Of all nodes that there are.
+    """
+    own = {section: section.rpartition('/')[2] for section in _sections(load_yaml(path), path)}
+    return [section for section, last in own.items() if last not in names
+            and get_close_matches(last, list(names), n=1) == [name]]
+
+
 def unused_sections(path: str | Path, namespace: str, kinds: Collection[str]) -> list[str]:
     """Sections of a parameter file that mean a kind of node, but none in a namespace.
 

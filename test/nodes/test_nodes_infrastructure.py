@@ -276,6 +276,19 @@ def test_values_for_all_nodes_may_be_foreign_but_not_ones_for_this_node(
     assert good.running, good
 
 
+def test_a_section_whose_name_is_misspelt_is_told_by_the_node_that_was_meant(
+        processes: Processes, tmp_path: Path) -> None:
+    """ROS passes it over without a word; one for another node of the suite is none."""
+    file = tmp_path / 'misspelt.yaml'
+    values = 'ros__parameters: {alpha_r: 2.0}'
+    file.write_text(f'refrence_filter: {{{values}}}\ninhibition: {{{values}}}\n')
+    process = processes.node('reference_filter', '--params-file', str(file))
+    process.wait_for_output('active')
+    assert ("has a section '/refrence_filter', which means no node; did you mean reference_filter?"
+            in process.output), process
+    assert process.output.count('has a section') == 1, process
+
+
 def test_descriptors_tell_unit_range_and_what_may_change(ros: Ros, started: Relay) -> None:
     names = ['alpha_r', 'count', 'executor', 'words', 'max_speed']
     answer = ros.call(DescribeParameters, 'relay/describe_parameters',

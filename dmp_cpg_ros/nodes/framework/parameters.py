@@ -19,12 +19,12 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from dmp_cpg_ros.configuration import load_yaml, nearest
+from dmp_cpg_ros.configuration import load_yaml, misspelt_sections, nearest
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.suite_parameters import OWNER
 from dmp_cpg_ros.nodes.messages.interfaces import published_by, read_by, served_by
-from dmp_cpg_ros.suite_table import KINDS, WALKING
+from dmp_cpg_ros.suite_table import KIND_OF, KINDS, WALKING
 
 BATCH, NORMAL = 'batch', 'normal'
 
@@ -194,6 +194,10 @@ def declare(node: Node, table: ParameterTable) -> dict[type[Parameters], Paramet
     ParameterError
         If an override is unknown, of the wrong type, not finite or out of range.
     """
+    for path in parameter_files(sys.argv):
+        for section in misspelt_sections(path, node.get_name(), {*KINDS, *KIND_OF}):
+            node.get_logger().warning(f"'{path}' has a section '{section}', which means no node; "
+                                      f'did you mean {node.get_name()}?')
     shared = shared_names(sys.argv)
     sets = table.build({
         name: plain(override.value) for name, override in node._parameter_overrides.items()
@@ -211,15 +215,19 @@ def declare(node: Node, table: ParameterTable) -> dict[type[Parameters], Paramet
     return sets
 
 
-def shared_names(arguments: Iterable[str]) -> set[str]:
+def parameter_files(arguments: Sequence[str]) -> list[str]:
+    """Parameter files of a command line that are there."""
+    return [path for flag, path in zip(arguments, arguments[1:], strict=False)
+            if flag == '--params-file' and Path(path).is_file()]
+
+
+def shared_names(arguments: Sequence[str]) -> set[str]:
     """Names under ``/**`` in the parameter files of a command line."""
     names: set[str] = set()
-    arguments = list(arguments)
-    for flag, path in zip(arguments, arguments[1:], strict=False):
-        if flag == '--params-file' and Path(path).is_file():
-            section = load_yaml(path).get('/**')
-            values = section.get('ros__parameters') if isinstance(section, dict) else None
-            names |= set(_flat_names(values)) if isinstance(values, dict) else set()
+    for path in parameter_files(arguments):
+        section = load_yaml(path).get('/**')
+        values = section.get('ros__parameters') if isinstance(section, dict) else None
+        names |= set(_flat_names(values)) if isinstance(values, dict) else set()
     return names
 
 
