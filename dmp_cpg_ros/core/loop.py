@@ -178,14 +178,19 @@ class WalkingLoop:
     def _joint_targets(self, state: RobotState, x_dot: Array, feedback: PostureFeedback,
                        dt: float) -> JointTargets:
         """Targets of all legs."""
-        canon, position, velocity = self.canon, state.joint_position, state.joint_velocity
-        steps = [leg.step(before, canon.gait, canon.x, x_dot, self.r, feedback, position, velocity,
-                          dt) for leg, before in zip(self.legs, self.leg_states, strict=True)]
-        self.leg_states = [after for after, _ in steps]
-        columns = [of.position for _, of in steps] + [of.velocity for _, of in steps] + [
-            of.effort for _, of in steps]
+        legs = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
+        columns = [leg.position for leg in legs] + [leg.velocity for leg in legs] + [
+            leg.effort for leg in legs]
         every, count = np.concatenate(columns), len(JOINT_NAMES)
         return JointTargets(every[:count], every[count:2 * count], every[2 * count:])
+
+    def _leg(self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback,
+             dt: float) -> JointTargets:
+        canon = self.canon
+        self.leg_states[i], targets = self.legs[i].step(
+            self.leg_states[i], canon.gait, canon.x, x_dot, self.r, feedback,
+            state.joint_position, state.joint_velocity, dt)
+        return targets
 
     @property
     def network(self) -> GaitNetwork:

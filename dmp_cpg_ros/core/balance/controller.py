@@ -147,9 +147,8 @@ class PostureController:
         self._com_in_base = vec3.triple(description.com_in_base.tolist())
         self._torque_limit = [
             float(most) for leg in description.legs for most in leg.torque_limit]
-        inertia = description.base_inertia.diagonal()
         # moments count as the accelerations that they cause at the length of a leg
-        importance = description.mass * self.scale.leg_length / inertia
+        importance = description.mass * self.scale.leg_length / description.base_inertia.diagonal()
         self._importance = vec3.triple(importance.tolist())
 
     def initial_state(self) -> PostureState:
@@ -186,11 +185,9 @@ class PostureController:
         p, leg_length = self.parameters, self.scale.leg_length
         stride = self._stride(memory.activity, gait, x, x_dot, r, dt)
         R_world_base = vec3.rotation(state.base_quaternion.tolist())
-        R_ground_base, upward = ground_from_base(
-            R_world_base, state.ground_normal_in_world,
-            p.slope_following * memory.terrain.followed)
-        felt = state.felt_legs
-        if felt is not None:
+        normal, share = state.ground_normal_in_world, memory.terrain.followed
+        R_ground_base, upward = ground_from_base(R_world_base, normal, p.slope_following * share)
+        if (felt := state.felt_legs) is not None:
             if state.feels_nothing:
                 R_ground_base = LEVEL_WITH_GROUND
             state = as_planned(state, self.kinematics, self._nominal, stride.reference,
@@ -282,8 +279,7 @@ class PostureController:
                 legs: Sequence[tuple[Triple, Matrix]], stride: Stride, gait: GaitInForce,
                 measured: Triple, dt: float) -> tuple[Terrain, tuple[float, ...]]:
         """Memory of the ground, and heights of the feet over the plane with a normal that the body
-        follows [m]; a body tells a first step at low velocities (v_x, v_y [m/s], γ [rad/s]) of the
-        reference and its own only.
+        follows [m]; a body tells a first step at low velocities of reference and its own only.
         """
         if not self.parameters.climbing:
             return NOTHING_FELT, LEVEL_FEET
