@@ -19,7 +19,7 @@ pytest.importorskip('mujoco')
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.nodes.framework.health import BINS, Durations, RobotTiming
 from dmp_cpg_ros.nodes.messages import interfaces
-from dmp_cpg_ros.studies import bench_ros, relays
+from dmp_cpg_ros.studies import bench_ros, bench_rows, relays
 from dmp_cpg_ros.studies.process_usage import between, usage
 from dmp_cpg_ros.suite_table import RECORDED_WALK
 
@@ -30,8 +30,8 @@ DOCUMENT = Path(__file__).resolve().parents[2] / 'doc' / 'performance.md'
 
 def test_every_row_is_documented_and_the_table_has_its_place(tmp_path: Path) -> None:
     text = DOCUMENT.read_text(encoding='utf-8')
-    for row in bench_ros.ROWS:
-        assert f'| `{row}` |' in text and getattr(bench_ros.Bench, row).__doc__
+    for row in bench_rows.ROWS:
+        assert f'| `{row}` |' in text and getattr(bench_rows.Bench, row).__doc__
     copy = tmp_path / 'copy.md'
     copy.write_text(text, encoding='utf-8')
     bench_ros.update(copy, 'new')
@@ -61,15 +61,15 @@ def test_it_measures_the_suite_beside_relays(
 
 def test_what_was_measured_stays_when_a_row_fails_or_is_interrupted(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def measured(error: BaseException) -> Callable[[object], Iterator[bench_ros.Figure]]:
-        def row(self: object) -> Iterator[bench_ros.Figure]:
-            yield bench_ros.Figure('one', 's', 2.0, 0.0 if isinstance(error, DataError) else 4.0)
+    def measured(error: BaseException) -> Callable[[object], Iterator[bench_rows.Figure]]:
+        def row(self: object) -> Iterator[bench_rows.Figure]:
+            yield bench_rows.Figure('one', 's', 2.0, 0.0 if isinstance(error, DataError) else 4.0)
             raise error
 
         return row
 
-    monkeypatch.setattr(bench_ros.Bench, 'latency', measured(DataError('it fell')))
-    monkeypatch.setattr(bench_ros.Bench, 'cpu', measured(KeyboardInterrupt()))
+    monkeypatch.setattr(bench_rows.Bench, 'latency', measured(DataError('it fell')))
+    monkeypatch.setattr(bench_rows.Bench, 'cpu', measured(KeyboardInterrupt()))
     file = tmp_path / 'bench.json'
     assert bench_ros.main(['--rows', 'latency', 'cpu', 'memory', '--json', str(file)]) == 130
     rows = json.loads(file.read_text(encoding='utf-8'))['rows']
