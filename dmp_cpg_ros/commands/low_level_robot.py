@@ -34,15 +34,9 @@ from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
 from dmp_cpg_ros.nodes.framework.claims import claim
-from dmp_cpg_ros.nodes.framework.execution import (
-    BAD_INPUT,
-    FAILED,
-    OK,
-    first_signal,
-    spin,
-    start_ros,
-)
+from dmp_cpg_ros.nodes.framework.execution import BAD_INPUT, FAILED, OK, first_signal, spin
 from dmp_cpg_ros.nodes.framework.health import Durations
+from dmp_cpg_ros.nodes.framework.middleware import start_ros
 from dmp_cpg_ros.nodes.messages.interfaces import (
     COMMAND_INTERFACES,
     IMU_BROADCASTER,

@@ -23,9 +23,8 @@ from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.commands.ros_arguments import checked_namespace
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
-from dmp_cpg_ros.nodes.framework.execution import (
-    BAD_INPUT,
-    FAILED,
+from dmp_cpg_ros.nodes.framework.execution import BAD_INPUT, FAILED
+from dmp_cpg_ros.nodes.framework.middleware import (
     prepare_middleware,
     start_ros,
     without_ros_arguments,

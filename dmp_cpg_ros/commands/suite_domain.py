@@ -13,7 +13,7 @@ from typing import Any
 from rclpy.context import Context
 from rclpy.node import Node
 
-from dmp_cpg_ros.nodes.framework import claims, execution
+from dmp_cpg_ros.nodes.framework import claims, middleware
 from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
 
 LOOK_S = 1.0
@@ -41,9 +41,9 @@ def alone_in_domain(namespace: str, meanwhile: Callable[[], Any] = lambda: None
         If another has it, or nodes of one are in the graph, left over perhaps.
     """
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    execution.prepare_middleware()
+    middleware.prepare_middleware()
     context = Context()
-    execution.start_ros([], context)
+    middleware.start_ros([], context)
     try:
         domain = context.get_domain_id()
         held = claims.claim(f'{namespace}/suite', domain)

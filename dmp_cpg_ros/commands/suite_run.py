@@ -15,7 +15,7 @@ from dmp_cpg_ros.commands.fork_server import ForkServer
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.commands.suite_watch import Say, SuiteError, SuiteWatch
 from dmp_cpg_ros.core.scenario.scenario import Scenario
-from dmp_cpg_ros.nodes.framework import execution
+from dmp_cpg_ros.nodes.framework import execution, middleware
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
 from dmp_cpg_ros.suite_table import PROCESSES, RECORDER, VISUALIZATION
 
@@ -80,7 +80,7 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
     """
     group, views = ProcessGroup(logs, server), ProcessGroup(logs, server)
     with ending_signals() as interrupted:
-        execution.start_ros(['walk', *arguments])
+        middleware.start_ros(['walk', *arguments])
         try:
             if view:  # its address holds a token, which is for the terminal only
                 views.start('live_view', ['live_view', *arguments], logged=False)

@@ -28,7 +28,7 @@ from pathlib import Path
 import numpy as np
 import rclpy
 
-from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
+from dmp_cpg_ros.nodes.framework.middleware import prepare_middleware
 from dmp_cpg_ros.studies.intruder_attacks import ATTACKS, LAST_S, NOTHING
 from dmp_cpg_ros.studies.intruder_node import Intruder
 from dmp_cpg_ros.studies.output import markdown_table, write_results

@@ -24,12 +24,8 @@ from multiprocessing.context import SpawnProcess
 from statistics import median
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.nodes.framework.execution import (
-    RANGE,
-    VARIABLES,
-    make_executor,
-    prepare_middleware,
-)
+from dmp_cpg_ros.nodes.framework.execution import make_executor
+from dmp_cpg_ros.nodes.framework.middleware import RANGE, VARIABLES, prepare_middleware
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of, write_results
 
 WAYS = ('suite', 'default')

@@ -27,7 +27,8 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from dmp_cpg_ros.commands.ros_arguments import run_command
-from dmp_cpg_ros.nodes.framework.execution import make_executor, prepare_middleware
+from dmp_cpg_ros.nodes.framework.execution import make_executor
+from dmp_cpg_ros.nodes.framework.middleware import prepare_middleware
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.walk_process import WalkProcess, ahead

@@ -30,7 +30,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from dmp_cpg_ros.core.estimation.parameters import StateSourceParameters
-from dmp_cpg_ros.nodes.framework import execution
+from dmp_cpg_ros.nodes.framework import execution, middleware
 from dmp_cpg_ros.nodes.framework.health import RobotTiming
 from dmp_cpg_ros.nodes.framework.parameters import BATCH
 from dmp_cpg_ros.nodes.messages import interfaces
@@ -262,7 +262,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--lock-step', action='store_true')
     parser.add_argument('--seconds', type=float, default=1.0, help='how long the source writes')
     options = parser.parse_args(arguments)
-    execution.prepare_middleware()
+    middleware.prepare_middleware()
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     SourceRelay.seconds = options.seconds
     kinds = {ROBOT: RobotRelay, SOURCE: SourceRelay}

@@ -35,13 +35,8 @@ from dmp_cpg_ros.commands.suite_run import ENDED_WITHIN_S
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.modes.falls import FALLEN_TILT
-from dmp_cpg_ros.nodes.framework.execution import (
-    PROFILES,
-    RANGE,
-    VARIABLES,
-    make_executor,
-    prepare_middleware,
-)
+from dmp_cpg_ros.nodes.framework.execution import make_executor
+from dmp_cpg_ros.nodes.framework.middleware import PROFILES, RANGE, VARIABLES, prepare_middleware
 from dmp_cpg_ros.nodes.framework.parameters import BEST_EFFORT, DELIVERIES
 from dmp_cpg_ros.studies.link_watch import LinkWatch
 from dmp_cpg_ros.studies.lossy_link import Conditions

@@ -38,7 +38,7 @@ TOPIC, TICK_NS = interface('joint_states'), 4_000_000
 
 INTRUDER = """
 import itertools, rclpy
-from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
+from dmp_cpg_ros.nodes.framework.middleware import prepare_middleware
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 prepare_middleware()
 rclpy.init()

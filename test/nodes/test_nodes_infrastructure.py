@@ -45,7 +45,7 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
-from dmp_cpg_ros.nodes.framework import execution
+from dmp_cpg_ros.nodes.framework import middleware
 from dmp_cpg_ros.nodes.framework.execution import make_executor, spin, spin_in_slices
 from dmp_cpg_ros.nodes.framework.health import LOG_EVERY_S, NodeHealth
 from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery
@@ -819,31 +819,31 @@ def test_without_a_folder_for_claims_it_is_said_which_is_needed(
 def test_the_middleware_profile_is_named_unless_the_user_has_one(
         monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
-    names = (*execution.VARIABLES, execution.RANGE, execution.LOCALHOST_ONLY)
+    names = (*middleware.VARIABLES, middleware.RANGE, middleware.LOCALHOST_ONLY)
 
     def prepared(**given: str) -> list[str | None]:
         for name in names:
             monkeypatch.setenv(name, given.get(name, ''))
-        execution.prepare_middleware()
+        middleware.prepare_middleware()
         first = [os.environ.get(name) for name in names]
-        execution.prepare_middleware()  # as a process that was started by this one
+        middleware.prepare_middleware()  # as a process that was started by this one
         assert [os.environ.get(name) for name in names] == first
         return first
 
-    subnet, local = (str(find_config(name)) for name in execution.PROFILES)
+    subnet, local = (str(find_config(name)) for name in middleware.PROFILES)
     assert prepared() == [subnet, subnet, '', '']
-    assert prepared(**{execution.RANGE: 'OFF'}) == [subnet, subnet, 'OFF', '']
-    assert prepared(**{execution.RANGE: 'LOCALHOST'}) == [local, local, 'SUBNET', None]
-    assert prepared(**{execution.LOCALHOST_ONLY: '1'}) == [local, local, 'SUBNET', None]
-    assert prepared(**{execution.VARIABLES[0]: 'mine.xml', execution.RANGE: 'LOCALHOST'}) == [
+    assert prepared(**{middleware.RANGE: 'OFF'}) == [subnet, subnet, 'OFF', '']
+    assert prepared(**{middleware.RANGE: 'LOCALHOST'}) == [local, local, 'SUBNET', None]
+    assert prepared(**{middleware.LOCALHOST_ONLY: '1'}) == [local, local, 'SUBNET', None]
+    assert prepared(**{middleware.VARIABLES[0]: 'mine.xml', middleware.RANGE: 'LOCALHOST'}) == [
         'mine.xml', '', 'LOCALHOST', '']
     (tmp_path / 'DEFAULT_FASTRTPS_PROFILES.xml').touch()
-    assert prepared(**{execution.RANGE: 'LOCALHOST'}) == ['', '', 'LOCALHOST', '']
+    assert prepared(**{middleware.RANGE: 'LOCALHOST'}) == ['', '', 'LOCALHOST', '']
 
 
 def test_the_profiles_differ_in_the_interface_only() -> None:
     subnet, local = (ElementTree.parse(find_config(name)).getroot()
-                     for name in execution.PROFILES)
+                     for name in middleware.PROFILES)
     descriptor = local.find('.//{*}transport_descriptor')
     assert descriptor is not None
     interfaces = descriptor.find('{*}interfaceWhiteList')

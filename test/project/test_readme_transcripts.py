@@ -18,7 +18,7 @@ from checkout import setup_constant
 from ros_processes import SHARED_HZ, NodeProcess, Processes, Ros, reserved_domain
 from test_readme import TRANSCRIPTS, as_shown, files, transcript
 
-from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
+from dmp_cpg_ros.nodes.framework.middleware import prepare_middleware
 from dmp_cpg_ros.nodes.messages.inhibition import read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.posture_feedback import read_body_mode

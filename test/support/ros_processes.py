@@ -40,7 +40,7 @@ from dmp_cpg_ros import __file__ as package
 from dmp_cpg_ros.commands.fork_server import Forked
 from dmp_cpg_ros.commands.fork_server import __file__ as fork_server_file
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
+from dmp_cpg_ros.nodes.framework.middleware import prepare_middleware
 from dmp_cpg_ros.studies.process_usage import pid_of
 
 TESTS, PACKAGES = (str(Path(file).resolve().parents[1]) for file in (__file__, package))
