@@ -11,8 +11,8 @@ hind foot is at δ/2 (or δ/2 − 1/2) and the fore foot at −δ/2, where
     gap = D − 2 x(δ/2) .
 
 A lower leg of the width w needs W = w + ``BESIDE`` l to pass another one, l being the standing
-height of the hips. Where the gap is less than 2 W the feet that come from behind, the hind ones
-on the way ahead, are placed outwards by W min(1, 2 − gap/W).
+height of the hips. What the gap is short of it, W − gap, but not more than W, the feet that come
+from behind, the hind ones on the way ahead, are placed outwards.
 
 So it is where legs of a side step half a cycle apart (δ = 1/2), as in a trot, and less the more
 another gait differs, none from a quarter on: with feet aside the body of an amble, which sways,
@@ -85,6 +85,5 @@ class Lanes:
             gap = distance - 2.0 * max(path.at(0.5 * ahead)[0][0],
                                        path.at(0.5 * ahead - 0.5)[0][0])
             leg = hind if v_x > 0.0 else fore
-            aside[leg] = self._outward[leg] * share * needed * clamped(
-                2.0 - gap / needed, 0.0, 1.0)
+            aside[leg] = self._outward[leg] * share * clamped(needed - gap, 0.0, needed)
         return tuple(aside)

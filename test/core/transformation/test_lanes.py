@@ -56,8 +56,8 @@ def test_feet_are_apart_by_what_legs_need_wherever_their_paths_come_as_near(
     for speed in SPEEDS:
         walk = paced(name, float(speed), robot)
         gap, aside = nearest(walk, robot), lanes.aside(*walk)
-        share = np.clip(2.0 - gap / needed, 0.0, 1.0)
-        assert max(aside[0], aside[2]) == pytest.approx(needed * share, abs=2e-3)
+        short = float(np.clip(needed - gap, 0.0, needed))
+        assert max(aside[0], aside[2]) == pytest.approx(short, abs=1e-3)
         assert min(aside[0], aside[2]) == 0.0
         assert aside[0] + aside[1] == aside[2] + aside[3] == 0.0
 
