@@ -19,6 +19,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.certificates.network import NetworkAnalysis, Setting, analyse_network
 from dmp_cpg_ros.core.certificates.step import cycle_radius_error, stepped_network
+from dmp_cpg_ros.core.certificates.timing import LONGEST_STOP, time_to_rest
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL
 from dmp_cpg_ros.core.contraction.synchronisation import cascade_weights, slowest_rate
@@ -59,6 +60,8 @@ def proof_of(s: Setting) -> Values:
     if s.parameters.reference.braking:
         raise ParameterError('a proof is for a reference without braking')
     analysis = analyse_network(s.network, s.parameters.inhibition, s.span)
+    if time_to_rest(s, analysis.capture, analysis.rest) >= LONGEST_STOP:
+        raise ParameterError('no exact proof is found: the time to rest is not certified')
     p = _parameters(s, analysis)
     shares = cascade_weights(s.network.system.graph, _CASCADE) if (
         analysis.found.weights is None) else analysis.found.weights

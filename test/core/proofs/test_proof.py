@@ -146,6 +146,10 @@ def test_couplings_that_are_not_multiples_of_one_have_no_proof() -> None:
 
 
 def test_what_is_not_certified_has_no_proof() -> None:
+    slow = random_setting(np.random.default_rng((53, 25)))       # of the equation, not of the step
+    assert certify(slow).failing[0].name == 'time_to_rest'
+    with pytest.raises(ParameterError, match='no exact proof'):
+        proof_of(slow)
     for changes in ({'coupling_gain': 2.0}, {'coupling_gain': 8.0}):
         with pytest.raises(ParameterError, match='no exact proof'):
             proof(network(**changes))
