@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Finds the YAML files of ``config/`` in every kind of installation, and reads them strictly.
+"""Finds the YAML files of ``config/`` in every kind of installation, and what they say to a node.
 
 Needs no ROS: a node's parameter file is read here as ROS 2 reads it, so that the plain loop, the
 certificate and the studies run with the numbers of the nodes.
@@ -8,24 +8,18 @@ certificate and the studies run with the numbers of the nodes.
 
 from __future__ import annotations
 
-import glob
 import os
 import re
-import stat
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable, Mapping
 from difflib import get_close_matches
-from functools import lru_cache
-from itertools import count
-from math import inf
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from dmp_cpg_ros.core.errors import DataError, DmpCpgError, MissingFileError
+from dmp_cpg_ros.core.errors import DataError, MissingFileError
 from dmp_cpg_ros.core.parameters import shown
+from dmp_cpg_ros.files import other_than_file
+from dmp_cpg_ros.strict_yaml import load_yaml
 
 PACKAGE = 'dmp_cpg_ros'
 _PACKAGE_FOLDER = Path(__file__).resolve().parent
@@ -34,19 +28,6 @@ _PARAMETERS_KEY = 'ros__parameters'
 
 ROBOTS, SCENARIOS, MOTIONS, POLICIES = 'robots', 'scenarios', 'motions', 'policies'
 """Folders of ``config/`` for files of one kind."""
-
-LARGEST_FILE = 2**18
-"""Longest file that is read [B]."""
-
-_PROCESSES = Path('/proc')
-"""Where Linux has a folder for every process that runs."""
-
-SHORT = 2**15
-"""Texts whose parse is kept are shorter [characters]."""
-
-DEEPEST = 32
-"""Deepest nesting of mappings and lists."""
-
 
 def find_config(name: str | Path, folder: str = '') -> Path:
     """Find a YAML file of the package by its name below ``config/``, or any file by its path.
@@ -90,89 +71,6 @@ def find_config(name: str | Path, folder: str = '') -> Path:
     raise MissingFileError(_not_found(name, meant, places))
 
 
-_FOLDER, _PIPE = 'is a folder', 'is a pipe'
-_KINDS = ((stat.S_ISDIR, _FOLDER), (stat.S_ISFIFO, _PIPE), (stat.S_ISSOCK, 'is a socket'),
-          (stat.S_ISCHR, 'is a device'), (stat.S_ISBLK, 'is a device'))
-
-
-def other_than_file(path: str | Path) -> str:
-    """What a path is that is no file, such as ``is a folder``; empty where there is nothing."""
-    try:
-        mode = os.stat(path).st_mode
-    except (OSError, ValueError):
-        return ''
-    return next((kind for holds, kind in _KINDS if holds(mode)), '')
-
-
-def readable(path: str | Path) -> Path:
-    """Path of a file that a user names, which is about to be read to its end.
-
-    A pipe without a writer is waited for, and a device such as ``/dev/zero`` has no end.
-
-    Parameters
-    ----------
-    path : str or Path
-        Need not exist: to open it then fails by itself.
-
-    Raises
-    ------
-    MissingFileError
-        If it is, or links to, a folder, a pipe, a socket or a device.
-    """
-    if kind := other_than_file(path):
-        raise MissingFileError(f"'{path}' {kind}, not a file")
-    return Path(path)
-
-
-def writable(path: str | Path) -> Path:
-    """Path that a user names, which is about to be written.
-
-    What is open already may be: ``/dev/stdout``, also into a pipe, and the shell's ``>(...)``.
-
-    Parameters
-    ----------
-    path : str or Path
-        Need not exist.
-
-    Raises
-    ------
-    MissingFileError
-        If it is, or links to, a folder, or a pipe by name: to open that waits for a reader.
-    """
-    kind = other_than_file(path)
-    if kind == _FOLDER or kind == _PIPE and os.path.exists(os.path.realpath(path)):
-        raise MissingFileError(f"'{path}' {kind}, not a file to write")
-    return Path(path)
-
-
-@contextmanager
-def replacing(path: str | Path) -> Iterator[Path]:
-    """File to write that takes the place of a path when it is whole; what is there stays until
-    then. What is no file, such as ``/dev/stdout``, is written itself; errors are as of
-    :func:`writable`. What a process that was killed has left of the same file is removed.
-    """
-    path = writable(path)
-    if path.exists() and not path.is_file():
-        yield path
-        return
-    path = path.resolve()
-    new = path.with_name(f'.{os.getpid()}.{path.name}')  # its ending may say what it is to be
-    _remove_left(path)
-    try:
-        yield new
-        os.replace(new, path)
-    finally:
-        new.unlink(missing_ok=True)
-
-
-def _remove_left(path: Path) -> None:
-    """Remove what processes that do not run any more have begun instead of a file."""
-    for left in path.parent.glob(f'.*.{glob.escape(path.name)}'):
-        writer = left.name[1:-len(path.name) - 1]
-        if writer.isdecimal() and _PROCESSES.is_dir() and not (_PROCESSES / writer).exists():
-            left.unlink(missing_ok=True)
-
-
 def nearest(name: str, valid: Iterable[str]) -> str:
     """Question for an error whether a name that is near was meant; empty where none is."""
     near = get_close_matches(name, list(valid), n=1)
@@ -195,91 +93,6 @@ def config_folders() -> list[Path]:
     prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     places += [Path(prefix) / _IN_SHARE for prefix in (*prefixes, sys.prefix) if prefix]
     return [place for place in dict.fromkeys(places) if place.is_dir()]
-
-
-def load_yaml(path: str | Path) -> dict[str, Any]:
-    """Read a YAML file that holds one mapping, see :func:`parse_yaml`.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
-    Returns
-    -------
-    dict
-        Its content; empty for a file without content.
-
-    Raises
-    ------
-    MissingFileError
-        If the file does not exist or cannot be read.
-    DataError
-        If it is too large, not YAML, or not a mapping; the text names the line.
-    """
-    path = readable(path)
-    try:
-        with path.open('rb') as file:
-            data = file.read(LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise MissingFileError(f"cannot read '{path}': {reason}") from error
-    # Bytes that are no UTF-8 become characters that are no YAML.
-    content = parse_yaml(data.decode(errors='surrogateescape'), f"'{path}'")
-    if not isinstance(content, (dict, type(None))):
-        raise DataError(f"'{path}', line 1: must be a mapping (name: value), "
-                        f'not {type(content).__name__}')
-    return content or {}
-
-
-@contextmanager
-def naming(path: str | Path) -> Iterator[None]:
-    """Name a file in the errors about what it holds; too much of it is such an error as well."""
-    try:
-        yield
-    except DmpCpgError as error:
-        if str(path) in str(error):
-            raise
-        raise type(error)(f"'{path}': {error}") from error
-    except (MemoryError, OverflowError, RecursionError) as error:
-        raise DataError(f"'{path}' holds more than can be read: {error}") from error
-
-
-def parse_yaml(text: str, where: str) -> Any:
-    """Read YAML strictly: mappings, lists, and scalars as ROS 2 reads them.
-
-    Stricter than PyYAML: a name that stands twice, an alias and a tag other than those of the
-    scalars are errors (an alias can stand for more values than there is memory; ROS 2 refuses
-    them too). ``1e-3`` is a number, a date is text, and names are always text.
-
-    Parameters
-    ----------
-    text : str
-        At most ``LARGEST_FILE`` characters, nested at most ``DEEPEST`` deep.
-    where : str
-        What the text is, for errors.
-
-    Returns
-    -------
-    dict, list, str, float, int, bool or None
-
-    Raises
-    ------
-    DataError
-        If it is not such YAML; the text names line and column.
-    """
-    if len(text) > LARGEST_FILE:
-        raise DataError(f'{where} is longer than {LARGEST_FILE} characters')
-    try:
-        node = _kept(text) if len(text) < SHORT else _Composer(text).get_single_node()
-        return None if node is None else _value(node)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        place = f', line {mark.line + 1}, column {mark.column + 1}' if mark else ''
-        raise DataError(f'{where}{place}: {error.problem or error.context}') from error
-    except yaml.reader.ReaderError as error:
-        line = text.count('\n', 0, error.position) + 1
-        raise DataError(f'{where}, line {line}: not YAML in UTF-8: {error.reason}') from error
 
 
 def node_parameters(content: Mapping[str, Any], node_name: str, path: str | Path
@@ -351,83 +164,6 @@ def unused_sections(path: str | Path, namespace: str, kinds: Collection[str]) ->
             and not _applies(section, f'{namespace}/{name}')]
 
 
-class _Composer(yaml.SafeLoader):
-    """PyYAML's parser with the scalars of ROS 2, without aliases and bottomless nesting."""
-
-    _depth = 0
-
-    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        event = self.peek_event()
-        if isinstance(event, yaml.AliasEvent):
-            raise _error(event, 'an alias (*name) is not valid; write out what it stands for')
-        if self._depth >= DEEPEST:
-            raise _error(event, f'nested deeper than {DEEPEST}')
-        self._depth += 1
-        node = super().compose_node(parent, index)
-        self._depth -= 1
-        return node
-
-
-@lru_cache(maxsize=16)
-def _kept(text: str) -> yaml.Node | None:
-    """Parse a text that is parsed again: all nodes of a process read the same few files."""
-    return _Composer(text).get_single_node()
-
-
-def _value(node: yaml.Node) -> Any:
-    """Content of a node as plain Python values."""
-    kind = node.tag.removeprefix(_TAG)
-    if kind == 'map' and isinstance(node, yaml.MappingNode):
-        content: dict[str, Any] = {}
-        for key, value in node.value:
-            if not isinstance(key, yaml.ScalarNode) or not key.value.isprintable():
-                raise _error(key, 'a name must be a word or text on one line')
-            if key.value in content:
-                raise _error(key, f'the key {key.value!r} stands twice')
-            content[key.value] = _value(value)
-        return content
-    # launch writes the lists that it hands to a node as tuples.
-    if kind in ('seq', 'python/tuple') and isinstance(node, yaml.SequenceNode):
-        return [_value(entry) for entry in node.value]
-    if kind not in _SCALARS or not isinstance(node, yaml.ScalarNode):
-        raise _error(node, f'the tag {node.tag!r} is not valid here; valid are '
-                           f"{', '.join(_SCALARS)}")
-    try:
-        return _SCALARS[kind][1](node.value)
-    except (KeyError, ValueError) as error:
-        raise _error(node, f'no value of type {kind}: {error}') from error
-
-
-def _error(place: Any, problem: str) -> yaml.MarkedYAMLError:
-    return yaml.MarkedYAMLError(problem=problem, problem_mark=place.start_mark)
-
-
-def _whole(text: str) -> int:
-    """Whole number in decimal, octal (``010``) or hexadecimal notation."""
-    digits = text.lstrip('+-').lower()
-    base = 16 if digits.startswith('0x') else 8 if digits.startswith('0') else 10
-    value = int(text, base) if len(text) < 80 else inf
-    if not -2**63 <= value < 2**63:
-        raise ValueError('a whole number has at most 64 bits')
-    return int(value)
-
-
-_TAG = 'tag:yaml.org,2002:'
-_SCALARS: dict[str, tuple[str | None, Callable[[str], Any]]] = {
-    'str': (None, str),
-    'null': ('~|null|Null|NULL|', lambda _: None),
-    'bool': ('(?i:true|false|yes|no|on|off)', lambda text: _Composer.bool_values[text.lower()]),
-    'int': ('[-+]?(0[0-7]*|[1-9][0-9]*|0x[0-9a-fA-F]+)', _whole),
-    'float': (r'[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?\.(?i:inf)|\.(?i:nan)',
-              lambda text: float(re.sub(r'\.(?=[iInN])', '', text)))}
-"""Kinds of scalars: what is one without a tag, first match first, and how it is read."""
-
-_Composer.yaml_implicit_resolvers = {}
-for _kind, (_pattern, _) in _SCALARS.items():
-    if _pattern is not None:
-        _Composer.add_implicit_resolver(_TAG + _kind, re.compile(f'(?:{_pattern})$'), None)
-
-
 def _not_found(name: str | Path, meant: Path, places: list[Path]) -> str:
     """Say what is there instead: the files of the folder that was meant, and near names."""
     if not places:
@@ -477,15 +213,3 @@ def _applies(section: str, node_name: str) -> bool:
     pattern = ''.join(words.get(word, f'/{re.escape(word)}')
                       for word in section.strip('/').split('/'))
     return re.fullmatch(pattern, f"/{node_name.strip('/')}") is not None
-
-
-def numbered(path: Path) -> Iterator[Path]:
-    """A path, then the same with ``_1``, ``_2``, … at its end, without an end."""
-    yield path
-    for number in count(1):
-        yield path.with_name(f'{path.name}_{number}')
-
-
-def first_free(path: Path) -> Path:
-    """The first of :func:`numbered` that does not exist."""
-    return next(name for name in numbered(path) if not name.exists())

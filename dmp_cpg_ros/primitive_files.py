@@ -13,7 +13,7 @@ import numpy as np
 import yaml
 
 from dmp_cpg_ros import configuration
-from dmp_cpg_ros.configuration import find_config, load_yaml, naming, writable
+from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 from dmp_cpg_ros.core.parameters import Key, check_names, shown
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
@@ -22,6 +22,8 @@ from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
 from dmp_cpg_ros.core.primitives.spring_damper import FORMS, SpringDamper
 from dmp_cpg_ros.core.transformation.foot_path import Motion
 from dmp_cpg_ros.core.transformation.learned_motion import MOTION_NAMES, LearnedMotion
+from dmp_cpg_ros.files import writable
+from dmp_cpg_ros.strict_yaml import load_yaml, naming
 
 Primitive = DiscretePrimitive | RhythmicPrimitive
 

@@ -10,14 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dmp_cpg_ros.configuration import (
-    ROBOTS,
-    find_config,
-    load_yaml,
-    naming,
-    nearest,
-    node_parameters,
-)
+from dmp_cpg_ros.configuration import ROBOTS, find_config, nearest, node_parameters
 from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.gait import Gait
@@ -28,6 +21,7 @@ from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.primitive_files import load_motion
+from dmp_cpg_ros.strict_yaml import load_yaml, naming
 from dmp_cpg_ros.suite_table import KINDS, LEG, ROBOT, WALKING
 
 DEFAULT_FILE = 'suite.yaml'

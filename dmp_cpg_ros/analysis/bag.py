@@ -27,9 +27,10 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 from dmp_cpg_ros.analysis.rescue import PACKED_SUFFIX, Unpacker, closed, ros_part, told, unpacked
-from dmp_cpg_ros.configuration import load_yaml, naming, readable
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, MissingFileError
 from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.files import readable
+from dmp_cpg_ros.strict_yaml import load_yaml, naming
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 """Definitions of the messages that are read; those in a bag are not trusted."""

@@ -19,10 +19,10 @@ from dmp_cpg_ros.analysis import recording
 from dmp_cpg_ros.analysis.bag import base_name, find_bag, opened, recorded, warn_of
 from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent
 from dmp_cpg_ros.analysis.topics import ALL_FIELDS, FIELDS, TOPICS, Block, Topic, in_batches
-from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
+from dmp_cpg_ros.strict_yaml import naming
 
 Statuses = Sequence[tuple[str, StatusEvent]]
 """Names and statuses, as they came."""

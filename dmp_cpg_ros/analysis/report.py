@@ -23,7 +23,7 @@ from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.strict_json import to_json
 from dmp_cpg_ros.analysis.tables import as_text, flattened
-from dmp_cpg_ros.configuration import writable
+from dmp_cpg_ros.files import writable
 
 _log = logging.getLogger(__name__)
 

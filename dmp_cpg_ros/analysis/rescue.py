@@ -29,9 +29,9 @@ from mcap.records import Attachment, Channel, Chunk, Header, McapRecord, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC, Writer
 
-from dmp_cpg_ros.configuration import numbered
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.parameters import LONGEST_SHOWN, shown
+from dmp_cpg_ros.files import numbered
 
 try:
     import fcntl

@@ -22,8 +22,8 @@ from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import held, roll_pitch_yaw, stretches
 from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.analysis.strict_json import plain, read_json, write_json
-from dmp_cpg_ros.configuration import writable
 from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.files import writable
 
 Draw = Callable[[Array, Array, Array], Sequence[NDArray[np.uint8]]]
 """From base positions (n, 3), quaternions (n, 4), joint positions (n, 12) to pictures, or none."""

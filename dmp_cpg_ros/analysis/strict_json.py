@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.configuration import readable, replacing
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
+from dmp_cpg_ros.files import readable, replacing
 
 
 def plain(value: Any) -> Any:

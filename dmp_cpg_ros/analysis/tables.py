@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
-from dmp_cpg_ros.configuration import writable
 from dmp_cpg_ros.core.errors import MissingFileError
+from dmp_cpg_ros.files import writable
 
 AT_ONCE = 10_000
 """Rows that are written together."""

@@ -32,9 +32,10 @@ from dmp_cpg_ros.analysis.tables import (
 from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT, RosArguments, one_line, run_command
 from dmp_cpg_ros.commands.run_folder import picture_taker, run_context, run_of
-from dmp_cpg_ros.configuration import naming, writable
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+from dmp_cpg_ros.files import writable
 from dmp_cpg_ros.process import give_back_memory
+from dmp_cpg_ros.strict_yaml import naming
 
 PARTLY = 1
 """Exit status where some of several runs could not be used."""

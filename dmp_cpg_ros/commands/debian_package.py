@@ -21,8 +21,8 @@ from typing import Any
 from zipfile import ZipFile
 
 from dmp_cpg_ros.commands.ros_arguments import run_command
-from dmp_cpg_ros.configuration import readable
 from dmp_cpg_ros.core.errors import MissingFileError
+from dmp_cpg_ros.files import readable
 
 DISTRIBUTION, PREFIX, PYTHON = 'jazzy', 'opt/ros/jazzy', 'python3.12'
 """Of ROS 2 on Ubuntu 24.04."""

@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis import bag
 from dmp_cpg_ros.analysis.loading import table_of
 from dmp_cpg_ros.analysis.topics import AT_ONCE, Block, Topic
-from dmp_cpg_ros.configuration import naming, readable
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, MissingFileError
 from dmp_cpg_ros.core.parameters import shown
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
+from dmp_cpg_ros.files import readable
+from dmp_cpg_ros.strict_yaml import naming
 
 _TIME_NAMES = ('t', 'time', 'time_s', 'timestamp', 'stamp')
 _ARRAYS = {'positions': '', 'velocities': '_velocity', 'accelerations': '_acceleration'}

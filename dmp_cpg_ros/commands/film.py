@@ -31,8 +31,8 @@ from dmp_cpg_ros.commands.ros_arguments import (
     within,
 )
 from dmp_cpg_ros.commands.run_folder import run_context
-from dmp_cpg_ros.configuration import replacing, writable
 from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.files import replacing, writable
 from dmp_cpg_ros.robot.camera import Camera
 
 Frame = NDArray[np.uint8]

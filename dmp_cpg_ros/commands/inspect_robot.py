@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.configuration import writable
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.files import writable
 from dmp_cpg_ros.robot.model_inspection import Inspection, inspect_model
 from dmp_cpg_ros.robot.robot_file import find_model
 

@@ -20,7 +20,6 @@ from dmp_cpg_ros.commands.ros_arguments import (
     within,
 )
 from dmp_cpg_ros.commands.walked_motion import read_motion
-from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.learning import discrete, period, rhythmic
 from dmp_cpg_ros.core.learning.learning import METHODS, FitOptions, ranges
@@ -30,6 +29,7 @@ from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
 from dmp_cpg_ros.core.primitives.spring_damper import FORMS
 from dmp_cpg_ros.core.transformation.learned_motion import LearnedMotion, learn_motion
 from dmp_cpg_ros.primitive_files import save_primitive
+from dmp_cpg_ros.strict_yaml import naming
 
 Primitive = DiscretePrimitive | RhythmicPrimitive
 

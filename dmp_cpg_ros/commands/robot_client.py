@@ -30,13 +30,13 @@ from dmp_cpg_ros.commands.suite_client import (
     velocity_command,
 )
 from dmp_cpg_ros.commands.teleop import AXES, HELD, drive, steer
-from dmp_cpg_ros.configuration import parse_yaml
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.nodes.framework.execution import OK
 from dmp_cpg_ros.nodes.framework.parameters import plain
 from dmp_cpg_ros.nodes.messages.commands import push_force
 from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, TOPICS, interface
+from dmp_cpg_ros.strict_yaml import parse_yaml
 from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
 
 INTERRUPTED = 130

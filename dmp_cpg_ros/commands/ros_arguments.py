@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from dmp_cpg_ros.configuration import parse_yaml
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+from dmp_cpg_ros.strict_yaml import parse_yaml
 
 BAD_INPUT = 2
 """Exit status of a command whose arguments or files cannot be used."""

@@ -18,13 +18,15 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from dmp_cpg_ros.analysis.context import RunContext, find_parameter
-from dmp_cpg_ros.configuration import ROBOTS, find_config, load_yaml, numbered
+from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.grounds import World
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
+from dmp_cpg_ros.files import numbered
+from dmp_cpg_ros.strict_yaml import load_yaml
 from dmp_cpg_ros.suite import load_gait, load_gaits, node_sets
 from dmp_cpg_ros.suite_table import RECORDER, instances
 

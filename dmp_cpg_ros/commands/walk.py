@@ -22,8 +22,6 @@ from dmp_cpg_ros.configuration import (
     SCENARIOS,
     config_folders,
     find_config,
-    load_yaml,
-    naming,
     unused_sections,
 )
 from dmp_cpg_ros.core.certificates.inequality import Certificate
@@ -32,6 +30,7 @@ from dmp_cpg_ros.core.maths.rounding import no_less
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.core.suite_parameters import REFERENCE
 from dmp_cpg_ros.primitive_files import motion_overrides
+from dmp_cpg_ros.strict_yaml import load_yaml, naming
 from dmp_cpg_ros.suite import Suite, load_suite
 from dmp_cpg_ros.suite_table import (
     KINDS,

@@ -19,7 +19,7 @@ from typing import Any
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
-from dmp_cpg_ros.configuration import ROBOTS, find_config, parse_yaml
+from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.errors import DataError, ParameterError
@@ -45,6 +45,7 @@ from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.port import Robot, RobotError
 from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.robot.urdf import urdf
+from dmp_cpg_ros.strict_yaml import parse_yaml
 from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, ROBOT
 
 READY_PERIOD_S, REMIND_S = 0.05, 3.0

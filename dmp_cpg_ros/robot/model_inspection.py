@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -19,6 +18,7 @@ from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_reader import read_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import RobotFile
+from dmp_cpg_ros.strict_yaml import naming
 
 AXIS_COSINE = 0.95
 """A joint turns about x, y or z of the base when the cosine between the axes is at least this."""

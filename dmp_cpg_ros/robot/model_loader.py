@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from dmp_cpg_ros.configuration import readable
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
 from dmp_cpg_ros.core.robot_model.grounds import Surface, World
+from dmp_cpg_ros.files import readable
 from dmp_cpg_ros.robot.model_text import check_text
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from dmp_cpg_ros.configuration import naming, readable
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.files import readable
 from dmp_cpg_ros.robot import model_parts
 from dmp_cpg_ros.robot.leg_width import leg_widths
 from dmp_cpg_ros.robot.model_loader import load_model
@@ -29,6 +29,7 @@ from dmp_cpg_ros.robot.robot_file import (
 )
 from dmp_cpg_ros.robot.soft_feet import standing_radius, with_rolling_radii
 from dmp_cpg_ros.robot.start_pose import home_joint_position
+from dmp_cpg_ros.strict_yaml import naming
 
 STANCE_LEG_SHARE = 0.7  # distance hip-foot over leg length when the model has no usable home pose
 GAIN_OVER_WEIGHT = 1.7  # kp / (m g L); gives 60 N m/rad for 9 kg and legs of 0.4 m

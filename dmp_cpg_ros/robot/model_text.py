@@ -14,9 +14,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from xml.parsers import expat
 
-from dmp_cpg_ros.configuration import DEEPEST, other_than_file, readable
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import shown
+from dmp_cpg_ros.files import other_than_file, readable
+from dmp_cpg_ros.strict_yaml import DEEPEST
 
 BODIES, COPIES, ELEMENTS = 'bodies', 'elements by multiplication', 'elements'
 BYTES, TEXT = 'bytes of memory', 'bytes of XML'

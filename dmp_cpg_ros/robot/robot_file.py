@@ -14,10 +14,12 @@ from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dmp_cpg_ros.configuration import find_config, load_yaml, naming, other_than_file
+from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
 from dmp_cpg_ros.core.parameters import Key, check_names, needed, shown
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS
+from dmp_cpg_ros.files import other_than_file
+from dmp_cpg_ros.strict_yaml import load_yaml, naming
 
 USUAL_VELOCITY_LIMIT = 30.0
 """Unitree Go1's published figure, for models that say nothing [rad/s]."""

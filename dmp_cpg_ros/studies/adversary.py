@@ -24,10 +24,10 @@ import numpy as np
 import yaml
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.configuration import readable
 from dmp_cpg_ros.core.canonical.inhibition import AUTO
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.files import readable
 from dmp_cpg_ros.studies import adversary_networks, adversary_rows
 from dmp_cpg_ros.studies.adversary_suite import play, random_events, setting, smaller, varied
 from dmp_cpg_ros.studies.draws import Case, smallest

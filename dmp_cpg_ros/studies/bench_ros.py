@@ -22,8 +22,8 @@ from typing import Any
 from dmp_cpg_ros.analysis.manifest import host_facts
 from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.commands.ros_arguments import run_command
-from dmp_cpg_ros.configuration import readable
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
+from dmp_cpg_ros.files import readable
 from dmp_cpg_ros.studies.bench_rows import ROWS, SHARING, SHORT, Bench, Figure, say
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of
 

@@ -34,7 +34,7 @@ from dmp_cpg_ros.commands.analyze import analyze_run
 from dmp_cpg_ros.commands.certify import running_setting
 from dmp_cpg_ros.commands.ros_arguments import run_command
 from dmp_cpg_ros.commands.run_folder import run_context
-from dmp_cpg_ros.configuration import find_config, naming
+from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.learning.discrete import learn_discrete
 from dmp_cpg_ros.core.learning.rhythmic import learn_rhythmic
@@ -46,6 +46,7 @@ from dmp_cpg_ros.core.transformation.learned_motion import MOTION_NAMES
 from dmp_cpg_ros.primitive_files import load_motion, load_primitive, save_primitive
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.robot_file import own_robot_file
+from dmp_cpg_ros.strict_yaml import naming
 from dmp_cpg_ros.suite import load_gaits, load_suite
 from dmp_cpg_ros.suite_table import POSTURE
 

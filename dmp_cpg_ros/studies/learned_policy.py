@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dmp_cpg_ros.configuration import POLICIES, find_config, load_yaml, naming
+from dmp_cpg_ros.configuration import POLICIES, find_config
 from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.vec3 import rotation
@@ -26,6 +26,7 @@ from dmp_cpg_ros.core.parameters import Parameters, check_names, parameter
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file
+from dmp_cpg_ros.strict_yaml import load_yaml, naming
 from dmp_cpg_ros.studies.loop_recording import LoopRun
 
 

@@ -25,13 +25,13 @@ from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.figures.gait import canonical_states, target_kinematics
 from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.configuration import writable
 from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.transformation.leg import body_scale
+from dmp_cpg_ros.files import writable
 from dmp_cpg_ros.paper.network import EdgeCoupling, OscillatorNetwork
 from dmp_cpg_ros.paper.oscillators import HopfOscillators, VanDerPolOscillators
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot

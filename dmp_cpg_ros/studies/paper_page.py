@@ -24,10 +24,12 @@ from importlib.resources import files
 from pathlib import Path
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.configuration import find_config, load_yaml, readable, writable
+from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.transformation.leg import body_scale
+from dmp_cpg_ros.files import readable, writable
 from dmp_cpg_ros.robot.model_reader import load_description
+from dmp_cpg_ros.strict_yaml import load_yaml
 from dmp_cpg_ros.suite import load_suite
 
 PACKAGES = {

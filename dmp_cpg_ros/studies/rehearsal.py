@@ -26,9 +26,10 @@ from dmp_cpg_ros.commands.low_level_robot import LAGS_S, NAME, told
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, positive, run_command, within
 from dmp_cpg_ros.commands.suite_domain import alone_in_domain
-from dmp_cpg_ros.configuration import find_config, load_yaml
+from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.nodes.messages.interfaces import COMMAND_INTERFACES
+from dmp_cpg_ros.strict_yaml import load_yaml
 from dmp_cpg_ros.studies.output import folder_of_logs, parser_of, write_results
 from dmp_cpg_ros.studies.process_usage import Usage, between, usage
 from dmp_cpg_ros.suite_table import COMPOSED, DRIVER, ROBOT, WALKING, WALKING_NODES

@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.configuration import readable, writable
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import DataError
@@ -31,6 +30,7 @@ from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.world import WORLDS
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale
+from dmp_cpg_ros.files import readable, writable
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies import loop_recording as runs
 from dmp_cpg_ros.studies.freezing_loop import FreezingLoop

@@ -103,7 +103,7 @@ def test_a_film_that_is_interrupted_leaves_what_was_there(tmp_path):
 
 BEGUN = """
 import sys
-from dmp_cpg_ros.configuration import replacing
+from dmp_cpg_ros.files import replacing
 with replacing(sys.argv[1]) as new:
     new.write_bytes(b'a part')
     print('begun', flush=True)

@@ -22,9 +22,10 @@ from ros_processes import NodeProcess, Processes, Ros, wait_until
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from dmp_cpg_ros.configuration import find_config, load_yaml
+from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.robot.urdf import urdf
+from dmp_cpg_ros.strict_yaml import load_yaml
 from dmp_cpg_ros.suite_table import (
     ABSOLUTE_TOPICS,
     KINDS,

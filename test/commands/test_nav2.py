@@ -18,13 +18,14 @@ from launch_files import read_launch_file, with_arguments
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.commands.nav2_limits import SMOOTHING_S, axis_limits, main, nav2_limits
-from dmp_cpg_ros.configuration import find_config, load_yaml, parse_yaml
+from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceSystem
 from dmp_cpg_ros.core.reference.governor import Governor
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.model_reader import load_description
+from dmp_cpg_ros.strict_yaml import load_yaml, parse_yaml
 from dmp_cpg_ros.suite import Suite, load_suite
 
 TICK_S = 0.004

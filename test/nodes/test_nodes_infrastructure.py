@@ -40,7 +40,7 @@ from ros_processes import NodeProcess, Processes, Ros
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from dmp_cpg_ros.configuration import find_config, load_yaml, node_parameters
+from dmp_cpg_ros.configuration import find_config, node_parameters
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
@@ -68,6 +68,7 @@ from dmp_cpg_ros.nodes.messages.interfaces import (
 )
 from dmp_cpg_ros.nodes.messages.reference import ReferenceWriter
 from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp
+from dmp_cpg_ros.strict_yaml import load_yaml
 from dmp_cpg_ros.suite_table import KINDS
 
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain

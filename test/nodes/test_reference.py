@@ -22,7 +22,6 @@ from rcl_interfaces.srv import ListParameters
 from ros_processes import Processes, Ros, composed_suite
 
 from dmp_cpg_ros.commands import reference
-from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.learning.discrete import learn_discrete
@@ -40,6 +39,7 @@ from dmp_cpg_ros.nodes.messages.interfaces import (
 )
 from dmp_cpg_ros.primitive_files import load_primitive, save_primitive
 from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file
+from dmp_cpg_ros.strict_yaml import load_yaml
 from dmp_cpg_ros.suite_table import DRIVER, KINDS, RECORDER, VISUALIZATION
 
 shared_domain, shared_ros = ros_processes.shared_domain, ros_processes.shared_ros

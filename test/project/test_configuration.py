@@ -14,19 +14,16 @@ import pytest
 from checkout import PACKAGE, ROOT
 
 from dmp_cpg_ros.configuration import (
-    DEEPEST,
-    LARGEST_FILE,
     MOTIONS,
     ROBOTS,
     config_folders,
     find_config,
-    load_yaml,
     node_parameters,
-    readable,
     unused_sections,
-    writable,
 )
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
+from dmp_cpg_ros.files import readable, writable
+from dmp_cpg_ros.strict_yaml import DEEPEST, LARGEST_FILE, load_yaml
 
 
 def written(folder: Path, text: str) -> Path:
@@ -120,8 +117,8 @@ def test_what_has_no_end_is_not_read_and_what_waits_is_not_written(tmp_path: Pat
 def test_every_kind_of_install(package: str, config: str, prefix_path: str,
                                tmp_path: Path) -> None:
     (tmp_path / package / 'core').mkdir(parents=True)
-    for module in ('__init__.py', 'configuration.py', 'core/__init__.py', 'core/errors.py',
-                   'core/parameters.py'):
+    for module in ('__init__.py', 'configuration.py', 'files.py', 'strict_yaml.py',
+                   'core/__init__.py', 'core/errors.py', 'core/parameters.py'):
         shutil.copy(ROOT / PACKAGE / module, tmp_path / package / module)
     (tmp_path / config).mkdir(parents=True)
     (tmp_path / config / 'only_here.yaml').touch()

@@ -26,7 +26,8 @@ from headlines import (
 )
 from headlines_of_commands import DEFAULTS, OPTIONS, options_of
 
-from dmp_cpg_ros.configuration import SCENARIOS, find_config, load_yaml
+from dmp_cpg_ros.configuration import SCENARIOS, find_config
+from dmp_cpg_ros.strict_yaml import load_yaml
 
 ROWS = table_of_studies()
 NUMBER = r'\d+(?:,\d{3})*(?:\.\d+)?'

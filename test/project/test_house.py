@@ -25,7 +25,7 @@ HOMES = {
     'GRAVITY': 'core.maths.constants',
     'SUITE_TABLE': 'suite_table',
     'POSTURE_ROWS': 'layouts',
-    'parse_yaml': 'configuration',
+    'parse_yaml': 'strict_yaml',
     'end_with_parent': 'process',
     'give_back_memory': 'process',
 }

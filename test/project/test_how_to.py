@@ -9,8 +9,8 @@ import re
 import pytest
 from checkout import ROOT
 
-from dmp_cpg_ros.configuration import parse_yaml
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
+from dmp_cpg_ros.strict_yaml import parse_yaml
 from dmp_cpg_ros.suite_table import KINDS
 
 CONTROLLERS = {

@@ -21,27 +21,30 @@ FIGURES = {'matplotlib'}
 FILMS = {'PIL', 'imageio_ffmpeg'}
 MODELS = {'mujoco', 'mujoco_menagerie'}
 EVERYTHING = {'numpy', 'scipy', 'yaml', *MODELS, *ROS, *RECORDS, *FIGURES, *FILMS}
+FILES = {'files', 'strict_yaml'}
 CLUSTER, POLICY = {'distributed'}, {'onnxruntime'}
 
 # layer: (own layers below it, packages of others); the standard library is everyone's.
 LAYERS = {
     'core': (set(), {'numpy', 'scipy'}),
     'paper': ({'core'}, {'numpy', 'scipy'}),
-    'configuration': ({'core'}, {'yaml'}),
+    'files': ({'core'}, set()),
+    'strict_yaml': ({'core', 'files'}, {'yaml'}),
+    'configuration': ({'core', *FILES}, set()),
     'suite_table': ({'core'}, set()),
     'layouts': ({'core'}, set()),
     'process': (set(), set()),
-    'suite': ({'core', 'configuration', 'suite_table', 'primitive_files'}, set()),
-    'primitive_files': ({'core', 'configuration'}, {'numpy', 'yaml'}),
-    'robot': ({'core', 'configuration', 'models'}, {'numpy', *MODELS}),
+    'suite': ({'core', 'configuration', 'suite_table', 'primitive_files', *FILES}, set()),
+    'primitive_files': ({'core', 'configuration', *FILES}, {'numpy', 'yaml'}),
+    'robot': ({'core', 'configuration', 'models', *FILES}, {'numpy', *MODELS}),
     'nodes': ({'core', 'configuration', 'layouts', 'process', 'suite_table', 'suite',
-               'primitive_files', 'robot'}, {'numpy', 'yaml', *ROS, *RECORDS}),
-    'analysis': ({'core', 'configuration', 'layouts', 'suite_table', 'suite'},
+               'primitive_files', 'robot', *FILES}, {'numpy', 'yaml', *ROS, *RECORDS}),
+    'analysis': ({'core', 'configuration', 'layouts', 'suite_table', 'suite', *FILES},
                  {'numpy', *RECORDS, *FIGURES}),
     'commands': ({'core', 'configuration', 'layouts', 'process', 'suite_table', 'suite',
-                  'primitive_files', 'robot', 'nodes', 'analysis'}, EVERYTHING),
+                  'primitive_files', 'robot', 'nodes', 'analysis', *FILES}, EVERYTHING),
     'studies': ({'core', 'paper', 'configuration', 'layouts', 'process', 'suite_table', 'suite',
-                 'primitive_files', 'robot', 'nodes', 'analysis', 'commands'},
+                 'primitive_files', 'robot', 'nodes', 'analysis', 'commands', *FILES},
                 EVERYTHING | CLUSTER | POLICY),
     '__main__': ({'suite_table'}, set()),
     'models': (set(), set()),
@@ -111,8 +114,8 @@ def test_no_import_runs_in_a_circle() -> None:
 @pytest.mark.parametrize(('layers', 'unwanted'), [
     (['core'], EVERYTHING - {'numpy'}),
     (['paper'], EVERYTHING - {'numpy', 'scipy'}),
-    (['configuration', 'layouts', 'process', 'suite_table', 'suite', 'primitive_files', 'models',
-      'analysis'], ROS | {'mujoco'}),
+    ([*FILES, 'configuration', 'layouts', 'process', 'suite_table', 'suite', 'primitive_files',
+      'models', 'analysis'], ROS | {'mujoco'}),
     (['robot'], ROS | RECORDS),
 ])
 def test_importing_a_layer_loads_nothing_that_it_must_do_without(

@@ -23,7 +23,7 @@ from checkout import PACKAGE, ROOT, imports, modules, setup_argument, setup_cons
 import dmp_cpg_ros
 from dmp_cpg_ros.__main__ import ON_THE_INDEX
 from dmp_cpg_ros.commands.debian_package import control, debian_package
-from dmp_cpg_ros.configuration import load_yaml
+from dmp_cpg_ros.strict_yaml import load_yaml
 from dmp_cpg_ros.suite_table import KINDS
 
 CONTRACT = ('reference_filter', 'canonical_oscillators', 'leg_transformation', 'inhibition',

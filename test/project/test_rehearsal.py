@@ -27,8 +27,9 @@ from std_msgs.msg import Float64MultiArray
 from test_how_to import example
 from test_readme import blocks
 
-from dmp_cpg_ros.configuration import find_config, load_yaml
+from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.nodes.messages.interfaces import COMMAND_INTERFACES, commands_of, interface
+from dmp_cpg_ros.strict_yaml import load_yaml
 from dmp_cpg_ros.studies import rehearsal
 
 processes, ros, ros_domain = (

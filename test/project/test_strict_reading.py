@@ -16,12 +16,13 @@ import yaml
 from checkout import ROOT
 
 from dmp_cpg_ros.commands.walk import load_scenario, main
-from dmp_cpg_ros.configuration import find_config, load_yaml
+from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.learning.discrete import learn_discrete
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.primitive_files import load_primitive, save_primitive
 from dmp_cpg_ros.robot.robot_file import load_robot_file
+from dmp_cpg_ros.strict_yaml import load_yaml
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
 LONGEST_S = 5.0

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from dmp_cpg_ros.configuration import find_config, load_yaml
+from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_model.grounds import Blocks
+from dmp_cpg_ros.strict_yaml import load_yaml
 from dmp_cpg_ros.suite import load_gaits, load_suite, node_sets
 from dmp_cpg_ros.suite_table import WALKING, Kind
 

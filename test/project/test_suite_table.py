@@ -14,7 +14,8 @@ import pytest
 from checkout import PACKAGE, ROOT, modules, setup_constant
 
 from dmp_cpg_ros.__main__ import COMMANDS, STUDIES, main
-from dmp_cpg_ros.configuration import find_config, load_yaml
+from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.strict_yaml import load_yaml
 from dmp_cpg_ros.suite_table import KINDS, RECORDER, SUITE_TABLE, WALKING_NODES, Kind
 
 OWN = {f'{PACKAGE}.suite_table', f'{PACKAGE}.core.suite_parameters'}

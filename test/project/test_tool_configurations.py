@@ -18,10 +18,10 @@ from entry_names import ENTRY_NAMES
 
 pytest.importorskip('rclpy')
 
-from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.nodes.messages.interfaces import SERVICES, TOPICS
 from dmp_cpg_ros.nodes.messages.markers import FEET, FOOTHOLDS, FORCES, PATHS
 from dmp_cpg_ros.nodes.messages.robot_state import BASE_FRAME, ODOM_FRAME
+from dmp_cpg_ros.strict_yaml import load_yaml
 from dmp_cpg_ros.suite_table import DRIVER, instances
 
 CONFIG = ROOT / 'config'

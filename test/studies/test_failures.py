@@ -12,11 +12,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.configuration import parse_yaml
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.fault import COMPONENTS, KINDS, Fault, FaultInjector
 from dmp_cpg_ros.core.scenario.scenario import Scenario
+from dmp_cpg_ros.strict_yaml import parse_yaml
 from dmp_cpg_ros.studies.failures import GAITS, Case, Outcome, trial
 
 DOCUMENT = Path(__file__).resolve().parents[2] / 'doc' / 'faults.md'

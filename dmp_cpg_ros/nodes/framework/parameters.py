@@ -19,11 +19,12 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from dmp_cpg_ros.configuration import load_yaml, misspelt_sections, nearest
+from dmp_cpg_ros.configuration import misspelt_sections, nearest
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.suite_parameters import OWNER
 from dmp_cpg_ros.nodes.messages.interfaces import published_by, read_by, served_by
+from dmp_cpg_ros.strict_yaml import load_yaml
 from dmp_cpg_ros.suite_table import KIND_OF, KINDS, WALKING
 
 BATCH, NORMAL = 'batch', 'normal'

@@ -36,8 +36,8 @@ from rosbags import interfaces as bags
 from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 from rosbags.typesys import Stores, get_typestore
 
-from dmp_cpg_ros.configuration import first_free
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+from dmp_cpg_ros.files import first_free
 
 STORAGES = ('mcap', 'sqlite3')
 
