@@ -19,6 +19,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
@@ -118,7 +119,7 @@ def test_what_was_wrong_before_a_node_begins_anew_is_not_told_any_more(ros: Ros)
     oscillators = made(ros, CanonicalOscillators)
     oscillators.start()
     late = 2_000_000_000
-    oscillators._take_inhibition(late, (1, oscillators._inhibition))
+    oscillators._take_inhibition(late, (1, Announced(oscillators._inhibition)))
 
     def told() -> Any:
         return oscillators.health.status('', {}, periodic=False).status[0]
@@ -126,7 +127,7 @@ def test_what_was_wrong_before_a_node_begins_anew_is_not_told_any_more(ros: Ros)
     assert 'inhibition is silent' in told().message
     begin_anew(oscillators)
     assert isinstance(oscillators._inhibition, Inhibition)
-    oscillators._take_inhibition(late, (late, oscillators._inhibition))
+    oscillators._take_inhibition(late, (late, Announced(oscillators._inhibition)))
     assert told().level == DiagnosticStatus.OK
 
 
@@ -138,7 +139,7 @@ def test_a_node_that_begins_anew_is_told_what_is_latched_within_its_process(ros:
         node.local = local
         node.start()
     assert inhibition._others.newest[0] == 0
-    oscillators._take_inhibition(1, (1, oscillators._inhibition))
+    oscillators._take_inhibition(1, (1, Announced(oscillators._inhibition)))
     for node in (reference, inhibition):  # both have a topic ~/commands_taken
         clean_up(node)
     inhibition.start()

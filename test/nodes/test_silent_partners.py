@@ -466,7 +466,7 @@ def test_in_lock_step_the_first_tick_of_who_comes_back_waits_for_the_memory(
     reference._publisher.publish = sent.append  # type: ignore[method-assign]
     loop, before, tick = walked(750)
     stamp = before.time_ns + TICK
-    reference.on_tick(stamp, {'joint_states': None, 'inhibition_gains': (stamp, RUNS)})
+    reference.on_tick(stamp, {'joint_states': None, 'inhibition_gains': (stamp, ACTS)})
     reference._memory._try_again()
     assert not sent
     if comes:

@@ -120,7 +120,8 @@ def test_what_the_sensors_tell_less_of_is_told_with_a_larger_variance() -> None:
     assert 0.0 < max(roll, pitch) < begun.attitude_variance[:2].min()
     assert yaw > begun.attitude_variance[2]            # nothing tells it
     assert (estimate.rate_variance > 0.0).all()
-    memory = replace(memory, estimate=replace(estimate, velocity_in_base=np.array((1.0, 0, 0))))
+    memory = replace(memory, estimate=replace(
+        estimate, velocity_in_base=np.array((1.0, 0, 0)), velocity_in_world=(1.0, 0.0, 0.0)))
     _, walked = estimator.step(memory, readings_of(standing_state(robot, 5000 * 4_000_000)))
     assert (walked.position_variance > estimate.position_variance).all()
 
