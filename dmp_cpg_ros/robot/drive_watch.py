@@ -154,8 +154,9 @@ class DriveWatch:
         self.failing = tuple(name for name, of in zip(self._names, lately, strict=True) if of)
 
     def _asked(self, ahead: Array, effort: Array, goes: Array, q_dot: Array) -> Array:
-        """Torques, in limits, that the drives give by both laws for angles that are ahead of them,
-        efforts and velocities to follow, each (..., 12): ndarray (2, ..., 12).
+        """Torques that the drives give by both laws, as shares of their limits, for angles that
+        are ahead of them [rad], efforts [N m] and velocities to follow [rad/s], each (..., 12):
+        ndarray (2, ..., 12).
         """
         plain = self._kp * ahead + self._kd * (goes - q_dot) + effort
         return np.asarray(self._limited(
