@@ -19,10 +19,12 @@ from dmp_cpg_ros.core.estimation.parameters import (
     EstimationParameters,
     StateSourceParameters,
 )
+from dmp_cpg_ros.core.inhibition.blocked import Progress
 from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw
 from dmp_cpg_ros.core.modes.body_control import BodyControl
 from dmp_cpg_ros.core.modes.manager import ModeParameters
 from dmp_cpg_ros.core.modes.requests import REQUESTS
+from dmp_cpg_ros.core.modes.shortfall import NO_SHORTFALL
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
@@ -37,7 +39,7 @@ from dmp_cpg_ros.nodes.messages.joint_targets import read_drive_mode
 from dmp_cpg_ros.nodes.messages.posture_feedback import PostureFeedbackWriter
 from dmp_cpg_ros.nodes.messages.reference import read_reference
 from dmp_cpg_ros.nodes.messages.transforms import WITHOUT_TF, TransformWriter
-from dmp_cpg_ros.nodes.messages.values import stamped, told_at
+from dmp_cpg_ros.nodes.messages.values import Array, stamped, told_at
 from dmp_cpg_ros.suite_table import POSTURE
 
 FORGOTTEN_NS = 300_000_000
@@ -224,6 +226,7 @@ class PostureControl(SuiteNode):
             description, self.parameters_of(PostureParameters),
             self.parameters_of(ModeParameters), legs)
         self._state, self._told = self._control.initial_state(), ''
+        self._shortfall = NO_SHORTFALL
         self._joined = False
         self._mode_publisher = self.publisher('body_mode')
         self._writer = PostureFeedbackWriter()
@@ -259,6 +262,7 @@ class PostureControl(SuiteNode):
         self._state = control
         self._publisher.publish(message)
         self._tell()
+        self._tell_shortfall(values['reference'], feedback.progress)
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """What the body does and why, and what the estimator found out."""
@@ -295,3 +299,15 @@ class PostureControl(SuiteNode):
         elif mode in ('standing', 'lying'):
             self.clear('fell')
         self.report()
+
+    def _tell_shortfall(self, r: Array, progress: Progress | None) -> None:
+        """Say that the body stays slower than what it was granted, and when it no longer does."""
+        before = self._shortfall
+        self._shortfall = now = before.step(
+            r, progress and progress.velocity, self._control.posture.scale.leg_length,
+            self.elapsed)
+        if now.lasts and not before.lasts:
+            self.warn('slow', f'the body goes at {now.goes:.2f} of the {now.asked:.2f} m/s of its '
+                      'reference: its legs bring it no faster in this gait, on this ground')
+        elif before.lasts and not now.lasts:
+            self.clear('slow')

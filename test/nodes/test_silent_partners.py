@@ -625,6 +625,27 @@ def test_a_posture_control_that_comes_back_tells_no_mode_before_it_knows_it(ros:
     assert modes == ['lying']
 
 
+def test_a_body_that_stays_slower_than_its_reference_is_told_until_it_follows(ros: Ros) -> None:
+    posture = PostureControl(context=ros.context, parameter_overrides=[
+        Parameter('state_source', value='ground_truth')])
+    ros.nodes.append(posture)
+    posture.start()
+    state, tick = walked(300)[1:]
+    reference, stamp = np.array((1.0, 0.0, 0.0)), state.time_ns
+    joints = state.joint_position, state.joint_velocity, state.joint_effort
+    posture.elapsed, told = TICK * 1e-9, []
+    for share in (0.6, 1.0):
+        for _ in range(2000):
+            stamp += TICK
+            posture.on_tick(stamp, {
+                'joint_states': (stamp, joints), 'reference': reference,
+                'canonical_state': (tick.x, tick.x_dot, tick.gait),
+                'ground_truth': (state.base_position_in_world, state.base_quaternion,
+                                 share * reference, state.base_rate_in_base)})
+        told.append(posture.health.has_problem('slow'))
+    assert told == [True, False]
+
+
 def test_a_robot_in_lock_step_tells_a_tick_again_that_does_not_end(ros: Ros) -> None:
     robot, told = MujocoRobotNode(context=ros.context, parameter_overrides=[
         Parameter('physics', value='perfect_tracking'), Parameter('lock_step', value=True),
