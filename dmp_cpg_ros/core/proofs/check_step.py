@@ -179,16 +179,20 @@ def gram(of: Polynomial, xi: Any) -> list[Any]:
                   for j in range(max(0, m - 3), min(m, 3) + 1))) for m in range(7)]
 
 
+def bernstein(K: list[Any], t: F) -> list[Any]:
+    """Matrices whose means are all values in [0, t] of a polynomial with four coefficients K."""
+    return [add((1, K[0]), (F(k, 3) * t, K[1]), (F(k * (k - 1), 6) * t**2, K[2]),
+                (k // 3 * t**3, K[3])) for k in range(4)]
+
+
 def norm(of: Polynomial, xi: Any, w: F, most: F) -> F:
     """Return a bound of what a polynomial makes of differences between nodes, if it is one."""
-    first, odd, second, *more = gram(of, xi)
+    K = gram(of, xi)
     spare = most * most - sum(w**m * root(sum(F(x * x, ONE**2) / (a * b) for a, row in zip(
-        xi, K, strict=True) for b, x in zip(xi, row, strict=True))) for m, K in (
-            (1, odd), *enumerate(more, 3)))
-    for turned in (F(0), w * w):                                 # and so between them
-        S = [[spare * x * ((i == j) - y) - (K + turned * k) / ONE + x * y for j, (y, K, k) in
-              enumerate(zip(xi, *both, strict=True))] for i, (x, *both) in enumerate(
-                  zip(xi, first, second, strict=True))]
+        xi, K[m], strict=True) for b, x in zip(xi, row, strict=True))) for m in (1, 3, 5))
+    for even in bernstein(K[::2], w * w):
+        S = [[spare * x * ((i == j) - y) - k / F(ONE) + x * y for j, (y, k) in enumerate(zip(
+            xi, row, strict=True))] for i, (x, row) in enumerate(zip(xi, even, strict=True))]
         while S:                                                 # positive, by elimination
             (pivot, *top), *rest = S
             need(pivot > 0, 'norm')

@@ -116,13 +116,11 @@ def _perron(Z: Array) -> list[Fraction]:
 
 def _norm(of: exact.Polynomial, xi: list[Fraction], w: Fraction) -> Fraction:
     """Norm of differences between nodes, a little above it."""
-    root = np.sqrt(_float(xi))
-    first, odd, second, *more = (_float(K) / exact.ONE / np.outer(root, root)
-                                 for K in exact.gram(of, xi))
-    top = max(float(np.linalg.eigvalsh(0.5 * (K + K.T))[-1])
-              for K in (first, first + float(w)**2 * second))
-    rest = sum(float(w)**m * float(np.linalg.norm(K)) for m, K in (
-        (1, odd), *enumerate(more, 3)))
+    root, K = np.sqrt(_float(xi)), exact.gram(of, xi)
+    scale = exact.ONE * np.outer(root, root)
+    top = max(float(np.linalg.eigvalsh(_float(even) / scale)[-1])
+              for even in exact.bernstein(K[::2], w * w))
+    rest = sum(float(w)**m * float(np.linalg.norm(_float(K[m]) / scale)) for m in (1, 3, 5))
     return _up(float(np.sqrt(max(top, 0.0) + rest)) + 1e-9)
 
 

@@ -306,6 +306,32 @@ def test_a_slow_leg_behind_quick_ones_has_a_proof() -> None:
     assert check_rest.check(found)['step_time_to_rest'][0] < 10
 
 
+def test_a_step_that_synchronises_slowly_while_it_turns_fast_has_a_proof() -> None:
+    found = proof_of(random_setting(np.random.default_rng((51, 26))))
+    assert check_rest.check(found)['step_synchronisation'][0] < 1
+
+
+def test_a_norm_is_refused_that_any_frequency_exceeds() -> None:
+    rng = np.random.default_rng(2)
+    for shift in (0.0, 0.01):
+        p = check_proof.read(proof(network())['parameters'])
+        weights = rng.dirichlet(np.full(4, 4.0))
+        xi = [Fraction(x) for x in weights.tolist()]
+        xi[0] += 1 - sum(xi)
+        spread = np.diag(weights) - np.outer(weights, weights)
+        values, vectors = np.linalg.eigh(spread)
+        root = vectors[:, 1:] * np.sqrt(values[1:])                    # |root.T y|^2 = y' spread y
+        back = vectors[:, 1:] / np.sqrt(values[1:])
+        for of in check_step.matrices(check_step.phi_of(p, 0), Fraction(shift))[:9]:
+            d = [np.array(x, dtype=float) / check_step.ONE for x in of.d]
+            most = max(np.linalg.norm(root.T @ sum(
+                (-1j * w)**m * x for m, x in enumerate(d)) @ back, 2)
+                for w in np.linspace(-0.5, 0.5, 41))
+            with pytest.raises(ValueError, match='norm'):
+                check_step.norm(of, xi, Fraction(1, 2), Fraction(0.999 * most))
+            check_step.norm(of, xi, Fraction(1, 2), Fraction(1.2 * most))
+
+
 def test_a_setting_whose_step_is_not_proved_has_a_proof_without_it() -> None:
     for gait, inhibition, tick, certificate in settings(count(), (1.5, 8.0)):
         if certificate['time_step'].required:
