@@ -88,7 +88,7 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
             for row in whole.inequalities]
     rows = discharged(rows, alike=replace(setting, parameters=p).alike)
     if not until_lost or all(row.holds or not row.required for row in rows):
-        rows += _votes(p, gaits, scale, tick_s, acting_cadence)
+        rows += _votes(p, gaits, scale, tick_s, acting_cadence, until_lost)
     if ways and not required_only:
         rows.append(Inequality(
             'offset_rate', share * span.omega[1], whole['frequency_mismatch'].right, 'rad/s',
@@ -122,9 +122,9 @@ def refused_change(parameters: SuiteParameters, walked: Sequence[Gait], wanted: 
 
 
 def _votes(p: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale, tick_s: float,
-           acting_cadence: float | None) -> list[Inequality]:
-    """What votes can do in the gaits, of each inequality the worst: their clamp follows the
-    cadence, and a stop waits until a change of gait is over.
+           acting_cadence: float | None, until_lost: bool) -> list[Inequality]:
+    """What votes can do in the gaits, of each inequality the worst, or all of the first in which
+    one fails: their clamp follows the cadence, and a stop waits until a change of gait is over.
     """
     worst: dict[str, Inequality] = {}
     for cadence in _cadences(p, acting_cadence):
@@ -133,6 +133,8 @@ def _votes(p: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale, tick_s: 
                 known = worst.get(row.name)
                 if known is None or not row.margin > known.margin:
                     worst[row.name] = replace(row, sentence=f'{row.sentence}, in {gait.name}')
+            if until_lost and not all(row.holds for row in worst.values()):
+                return list(worst.values())
     return list(worst.values())
 
 

@@ -20,13 +20,14 @@ from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.timing import LONGEST_STOP, time_to_rest
 from dmp_cpg_ros.core.contraction import inhibited
-from dmp_cpg_ros.core.contraction.capture import capture_set, shared_capture
+from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, SAMPLED
 from dmp_cpg_ros.core.contraction.voting import (
-    certified_threshold,
     different_voters,
-    rest_threshold,
+    enough_for_all,
+    shared_capture,
+    too_weak_for_all,
 )
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.maths import Array
@@ -74,10 +75,8 @@ def votes_needed(network: GaitNetwork, inhibition: InhibitionParameters, voting:
     voters = [different_voters(system, count) for count in range(1, len(LEGS) + 1)]
     return VotesNeeded(
         vote_clamp(network, inhibition, voting, span),
-        tuple(max(certified_threshold(system, span.omega_armed[1], legs, r0) for legs in sets)
-              for sets in voters),
-        tuple(min(rest_threshold(system, span.omega[0], legs, r0) for legs in sets)
-              for sets in voters))
+        tuple(enough_for_all(system, span.omega_armed[1], sets, r0) for sets in voters),
+        tuple(too_weak_for_all(system, span.omega[0], sets, r0) for sets in voters))
 
 
 def vote_bound(s: Setting, gains: Array) -> float:

@@ -21,7 +21,7 @@ nodes away from the origin, where oscillators diverge, and gives contraction on 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,9 +45,6 @@ RADIUS_TOLERANCE = 0.02
 
 PLACE_TOLERANCE = 0.02
 """Distance of a node from its place that the set allows at capture, as a fraction of r."""
-
-_SPARE = 1e-3  # share of r0 that is left where nodes relieve each other
-_MOST_PIECES = 5000
 
 
 @dataclass(frozen=True)
@@ -123,7 +120,7 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
         raise ParameterError(f'frequencies {omega.tolist()} must be finite, and gains '
                              f'{gains.tolist()} finite and not negative')
     inhibited = gains > 0.0
-    D = _target_radius(system, inhibited)
+    D = target_radius(system, inhibited)
     L = comparison_laplacian(system.graph)
     largest = invariant_radius(
         max(float(system.radius.max()), D), overshoot(L), float(system.rho.min()))
@@ -138,62 +135,6 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     inner = _smallest_radii(system, M, omega, u, D, region_radius, largest, tolerance)
     rate = slowest_rate(M - np.diag(growth(system.rho, system.radius, inner)))
     return CaptureSet(u, inner, needed, gains, tolerance, rate)
-
-
-def shared_capture(system: CanonicalSystem, omega: float | Array, capture: CaptureSet,
-                   region_radius: float) -> CaptureSet:
-    """Capture by several nodes of which those with less to hold relieve the others.
-
-    The box has every inhibited node at the edge of C for ever. From where C is entered, legs in
-    their places, distances stay below every w with ẇ ≥ g − M w, M = L + diag α and g that of the
-    box: none leaves C when w comes below the distances M⁻¹g that all bear before it passes r0.
-
-    Parameters
-    ----------
-    system, omega, region_radius
-        Those of :func:`capture_set`.
-    capture : CaptureSet
-        Its set, which not even states that are out of their places leave.
-
-    Returns
-    -------
-    CaptureSet
-        The same where it holds, or where this does not. Else with the gains that nodes which enter
-        C in their places need, α (M⁻¹g)/r0; they do not leave the box either.
-    """
-    held, L = ~np.isnan(capture.needed_gain), comparison_laplacian(system.graph)
-    M, most = L + np.diag(capture.gains), float(np.abs(L).max() + capture.gains.max())
-    if capture.holds or L.sum(axis=1).min() < -1e-9 * most or slowest_rate(M) <= 1e-9 * most:
-        return capture
-    g = outward_growth_within(system, np.broadcast_to(np.abs(omega), held.shape),
-                              _target_radius(system, held), capture.distance)
-    g = g + 1e-9 * most * region_radius
-    borne = np.linalg.solve(M, g)
-    spare = float((region_radius / borne[held]).min())
-    if spare < 1.0 + _SPARE or not _comes_below(
-            M, g, np.where(held, region_radius, region_radius + capture.tolerance),
-            np.asarray(min(spare, 1.05) * borne), held):
-        return capture
-    return replace(capture, needed_gain=np.where(held, capture.gains * borne / region_radius,
-                                                 np.nan))
-
-
-def _comes_below(M: Array, g: Array, w: Array, end: Array, held: Mask) -> bool:
-    """Whether a piecewise linear w with ẇ ≥ g − M w at both ends of each piece comes below its
-    end, the held entries never above where they begin.
-    """
-    h, edge = 0.1 / float(M.diagonal().max()), w[held]
-    implicit = np.linalg.inv(np.eye(len(w)) + h * M)
-    beside = h * float(M.diagonal().max())
-    for _ in range(_MOST_PIECES):
-        late = implicit @ (w + h * g)
-        ahead = np.maximum(late, w + h * (g - M @ w))
-        w = ahead + beside * float((ahead - late).max())
-        if np.any(w[held] > edge):
-            return False
-        if np.all(w <= end):
-            return True
-    return False
 
 
 def place_tolerance(omega: float, degree: float, radius: float) -> float:
@@ -257,7 +198,7 @@ def _radial_growth(system: CanonicalSystem, D: float, u: Array) -> Array:
         return np.asarray(system.rho * (offset - 2.0 * u * c) * (c + u))
 
 
-def _target_radius(system: CanonicalSystem, inhibited: Mask) -> float:
+def target_radius(system: CanonicalSystem, inhibited: Mask) -> float:
     """D = |x_d|; the inhibited nodes must be pulled to one state in locked coordinates."""
     if not np.any(inhibited):
         raise ParameterError('no node is inhibited: at least one gain must be positive')

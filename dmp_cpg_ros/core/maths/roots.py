@@ -1,10 +1,11 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where something ceases to hold, by bisection."""
+"""Where something ceases to hold, or changes its sign."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 
 
 def last_that_holds(holds: Callable[[float], bool], low: float, high: float, rounds: int) -> float:
@@ -28,3 +29,39 @@ def last_that_holds(holds: Callable[[float], bool], low: float, high: float, rou
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     return low
+
+
+def sign_change(value: Callable[[float], float], low: float, high: float, precision: float
+                ) -> tuple[float, float]:
+    """Positive numbers between which something becomes positive, or 0, from one that is below 0.
+
+    Goes where a straight line through the ends is 0 (Illinois), over the logarithm, and halves
+    the way at every third trial, where a value is infinite, and where values jump.
+
+    Parameters
+    ----------
+    value : callable
+        Of a number; it need not be continuous.
+    low, high : float
+        Positive. It is not computed there, but between them.
+    precision : float
+        Share by which the ends differ at most.
+
+    Returns
+    -------
+    low, high : float
+        Either the ends that were given, or numbers at which the value is below 0, and not.
+    """
+    below, above, least, trial, smooth = -inf, inf, 1.0 + 0.5 * precision, 0, True
+    while high > low * (1.0 + precision):
+        trial, most = trial + 1, max(-below, above)
+        line = smooth and trial % 3 > 0 and most < inf
+        middle = low * (high / low) ** (below / (below - above) if line else 0.5)
+        here = value(at := min(max(middle, low * least), high / least))
+        if line:
+            smooth = abs(here) <= 0.5 * most and (at == middle or (at < middle) == (here < 0.0))
+        if here < 0.0:
+            low, below, above = at, here, 0.5 * above if line else above
+        else:
+            high, above, below = at, here, 0.5 * below if line else below
+    return low, high

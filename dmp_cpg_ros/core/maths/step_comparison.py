@@ -28,6 +28,9 @@ from dmp_cpg_ros.core.maths.exponential import phi_functions
 
 _POWERS = 4  # 1, q, q², q³
 
+_BERNSTEIN = np.array([
+    [comb(k, m) / comb(_POWERS - 1, m) for m in range(_POWERS)] for k in range(_POWERS)])
+
 
 class StepBounds(NamedTuple):
     """Moduli of the matrices of a step, ndarray (n, n) each, or their norms as (1, 1).
@@ -174,7 +177,9 @@ class StepComparison:
             for k in range(_POWERS):
                 orders[m + k] += 1j**m * (-1j)**k * np.swapaxes(d[m], -1, -2) @ d[k]
         orders = 0.5 * (orders + np.swapaxes(orders, -1, -2).conj())
-        top = np.linalg.eigvalsh(orders)[..., -1]                          # (7, 18)
-        top[1:] = np.maximum(top[1:], 0.0)
-        squared = (np.abs(omega) ** np.arange(len(top))) @ top
-        return StepBounds(*np.sqrt(squared)[:, None, None])
+        # a polynomial in ω² lies among Bernstein's coefficients
+        turned = _BERNSTEIN * omega ** (2 * np.arange(_POWERS))
+        even = np.linalg.eigvalsh(np.tensordot(turned, orders[::2], 1))[..., -1].max(axis=0)
+        odd = np.maximum(np.linalg.eigvalsh(orders[1::2])[..., -1], 0.0)            # (3, 18)
+        squared = even + np.abs(omega) ** np.arange(1, 2 * _POWERS - 1, 2) @ odd
+        return StepBounds(*np.sqrt(np.maximum(squared, 0.0))[:, None, None])

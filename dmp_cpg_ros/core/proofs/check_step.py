@@ -24,7 +24,7 @@ def root(square: F) -> F:
     return x
 
 
-def add(*terms: tuple[int, Any], over: int = 1) -> Any:
+def add(*terms: tuple[Any, Any], over: int = 1) -> Any:
     """Sum of factors times matrices; entries of matrices are whole numbers, in units of 1/ONE."""
     return [[sum(c * x for (c, _), x in zip(terms, entries, strict=True)) // over
              for entries in zip(*rows, strict=True)]

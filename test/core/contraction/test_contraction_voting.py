@@ -14,7 +14,7 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.contraction.capture import capture_set, shared_capture
+from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
 from dmp_cpg_ros.core.contraction.voting import (
@@ -22,6 +22,7 @@ from dmp_cpg_ros.core.contraction.voting import (
     different_voters,
     majority_clamp,
     rest_threshold,
+    shared_capture,
 )
 from dmp_cpg_ros.core.errors import ParameterError
 
@@ -126,6 +127,20 @@ def test_a_majority_stops_the_gait_and_a_smaller_vote_does_not(majority: int) ->
         assert stopped(system, alpha, voters)
     for voters in combinations(range(4), majority - 1):
         assert not stopped(system, alpha, voters)
+
+
+@pytest.mark.parametrize('name', ['ring', 'path', 'star', 'directed_ring'])
+@pytest.mark.parametrize('majority', [1, 2, 3, 4])
+def test_the_clamp_is_for_every_set_of_voters(name: str, majority: int) -> None:
+    """Also for those of which no threshold of their own is looked for."""
+    system, sets = network(name, 60.0), [list(combinations(range(4), count))
+                                         for count in (majority, majority - 1)]
+    clamp = majority_clamp(system, OMEGA, REGION, majority)
+    enough = max(certified_threshold(system, OMEGA, voters, REGION) for voters in sets[0])
+    weak = min((rest_threshold(system, OMEGA, voters, REGION) for voters in sets[1] if voters),
+               default=np.inf)
+    assert clamp.lowest == enough or abs(clamp.lowest / enough - 1.0) <= 2.1e-4
+    assert clamp.highest == weak or abs(clamp.highest / weak - 1.0) <= 2.1e-4
 
 
 def test_a_majority_stops_a_network_whose_couplings_are_too_weak_for_one_leg() -> None:

@@ -1,0 +1,52 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where values change their sign is found, however they change it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dmp_cpg_ros.core.maths.roots import sign_change
+
+PRECISION = 1e-4
+KINDS: dict[str, Callable[[float], float]] = {
+    'smooth': lambda way: 1.0 - math.exp(-way),
+    'steep at first': lambda way: math.copysign(abs(way)**0.2, way),
+    'flat': lambda way: way**3,
+    'jumps': lambda way: 0.3 + way if way >= 0.0 else -1.0,
+    'unknown below': lambda way: way if way >= 0.0 else -math.inf,
+    'unknown': lambda way: math.copysign(math.inf, way)}
+
+
+@pytest.mark.parametrize('kind', KINDS)
+@given(place=st.floats(0.1, 10.0), low=st.floats(0.001, 0.1), high=st.floats(10.0, 100.0))
+def test_ends_are_close_and_on_both_sides(kind: str, place: float, low: float, high: float
+                                          ) -> None:
+    asked: list[float] = []
+
+    def value(at: float) -> float:
+        asked.append(at)
+        return KINDS[kind](math.log(at / place))
+
+    below, not_below = sign_change(value, low, high, PRECISION)
+    assert not_below <= below * (1.0 + PRECISION)
+    assert below == low or (below in asked and value(below) < 0.0)
+    assert not_below == high or (not_below in asked and value(not_below) >= 0.0)
+    halvings = math.log2(math.log(high / low) / math.log1p(PRECISION))
+    assert len(asked) - 2 <= 3.0 * halvings + 3.0
+
+
+def test_fewer_values_are_asked_for_than_by_halving_where_they_are_smooth() -> None:
+    asked: list[float] = []
+
+    def value(at: float) -> float:
+        asked.append(at)
+        return 1.0 - 0.7 / at
+
+    sign_change(value, 0.01, 100.0, PRECISION)
+    assert len(asked) < math.log2(math.log(1e4) / PRECISION)
