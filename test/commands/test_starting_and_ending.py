@@ -282,6 +282,35 @@ def test_ctrl_c_while_modules_are_imported_ends_quietly(processes: Processes, na
     assert process.output == ''
 
 
+LATE_INTERRUPT = """
+import os, signal, sys
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+class Late:
+    def __del__(self, kill=os.kill, pid=os.getpid(), number=signal.SIGINT):
+        if pid == os.getpid():  # and not what it forks
+            kill(pid, number)
+
+
+sys.argv = ['walk', '--help']
+from dmp_cpg_ros.__main__ import walk
+late = Late()
+try:
+    walk()
+finally:
+    print('ending', flush=True)
+"""
+"""Interrupts itself when Python deletes its objects, after it has let go of all signals."""
+
+
+def test_ctrl_c_at_the_very_end_does_not_change_the_exit_status(processes: Processes) -> None:
+    process = processes.python('-c', LATE_INTERRUPT)
+    assert process.wait() == 0, str(process)
+    assert process.output.endswith('ending\n')
+
+
 # --ros-args --------------------------------------------------------------------------------------
 
 
