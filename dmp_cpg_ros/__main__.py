@@ -9,6 +9,7 @@ quietly from the first moment on.
 from __future__ import annotations
 
 import ast
+import io
 import os
 import signal
 import sys
@@ -86,6 +87,8 @@ def run(name: str) -> int:
             print(f"dmp_cpg_ros: there is no '{name}'; {guess}valid are {', '.join(names)}",
                   file=sys.stderr)
             return BAD_INPUT
+        if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal need not have every character
+            sys.stdout.reconfigure(errors='backslashreplace')
         with _quiet_ctrl_c():
             module = import_module(_module(name))
             if _folder(name) == 'nodes':

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
 import stat
 from collections.abc import Iterator
@@ -51,10 +52,32 @@ def ending_signals() -> Iterator[list[int]]:
             signal.signal(number, handler)
 
 
+def hang_up() -> None:
+    """End the run in order, as when its terminal is closed: nobody reads what it prints."""
+    leave_output()
+    signal.raise_signal(signal.SIGHUP)
+
+
+def leave_output() -> None:
+    """Write to nowhere what is printed from here on, and what is still to be written."""
+    _leave(1)
+
+
+def is_unread() -> bool:
+    """Whether what is printed goes into a pipe that nobody reads any more."""
+    waiting = select.poll()
+    waiting.register(1, 0)
+    return any(events & select.POLLERR for _, events in waiting.poll(0))
+
+
 def _leave_terminal() -> None:
     """Write to nowhere instead of to a terminal that is gone."""
     for descriptor in (1, 2):
         if stat.S_ISCHR(os.fstat(descriptor).st_mode):
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, descriptor)
-            os.close(nowhere)
+            _leave(descriptor)
+
+
+def _leave(descriptor: int) -> None:
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, descriptor)
+    os.close(nowhere)

@@ -12,11 +12,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from dmp_cpg_ros.commands.ending_signals import is_unread, leave_output
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.strict_yaml import parse_yaml
 
 BAD_INPUT = 2
 """Exit status of a command whose arguments or files cannot be used."""
+
+UNREAD = 128 + 13
+"""Exit status of a command whose output nobody reads: that of a shell for SIGPIPE."""
 
 LONGEST_LINE = 5000
 """Length of an error on the terminal; the names of all parameters fit."""
@@ -73,14 +77,20 @@ def run_command(parser: argparse.ArgumentParser, arguments: Sequence[str] | None
     Returns
     -------
     int
-        Exit status: ``BAD_INPUT`` after a DmpCpgError or OSError.
+        Exit status: ``BAD_INPUT`` after a DmpCpgError or OSError; ``UNREAD`` where the reader of
+        a pipe has gone, as that of ``certify | head``.
     """
     options, ros = parse_arguments(parser, arguments, parameters=parameters)
     try:
-        return run(options, ros)
+        status = run(options, ros)
+        print(end='', flush=True)
+        return status
     except DmpCpgError as error:
         problem = str(error)
     except OSError as error:
+        if isinstance(error, BrokenPipeError) and is_unread():
+            leave_output()
+            return UNREAD
         problem = f"cannot write '{error.filename or 'output'}': {error.strerror}"
     print(f'{parser.prog}: {one_line(problem)}', file=sys.stderr)
     return BAD_INPUT

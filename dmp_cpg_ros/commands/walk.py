@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from dmp_cpg_ros.commands import ros_arguments, run_folder
 from dmp_cpg_ros.commands.certify import running
+from dmp_cpg_ros.commands.ending_signals import InterruptedRunError, hang_up
 from dmp_cpg_ros.configuration import (
     ROBOTS,
     SCENARIOS,
@@ -216,7 +217,6 @@ def _run(plan: _Plan, folder: Path, server: ForkServer) -> tuple[int, list[str]]
     """Bring the suite up, play, bring it down; returns the exit status and what to say at the
     end.
     """
-    from dmp_cpg_ros.commands.ending_signals import InterruptedRunError
     from dmp_cpg_ros.commands.suite_run import run_suite
 
     options, ros = plan.options, plan.ros
@@ -284,7 +284,10 @@ def _film(folder: Path, given: str) -> None:
 
 def _say(time_s: float, text: str) -> None:
     stamp = '        ' if math.isnan(time_s) else f'{time_s:7.2f} s'
-    print(f'{stamp}  {text}', flush=True)
+    try:
+        print(f'{stamp}  {text}', flush=True)
+    except BrokenPipeError:  # as in walk | head
+        hang_up()
 
 
 def _parser() -> argparse.ArgumentParser:

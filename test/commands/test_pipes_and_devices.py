@@ -1,6 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""No command waits at a pipe that it is given for a file, or reads a device without an end."""
+"""No command waits at a pipe that it is given for a file, or reads a device without an end, or
+minds who reads what it prints.
+"""
 
 from __future__ import annotations
 
@@ -130,6 +132,35 @@ def test_a_pipe_that_is_open_is_written_into() -> None:
     ended = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
                            timeout=60, check=False)
     assert (ended.stdout, ended.stderr) == ('{}\n', '')
+
+
+def command(*arguments: object, **environment: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, '-m', 'dmp_cpg_ros', *map(str, arguments)], stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, env={**os.environ, **environment})
+
+
+def test_who_reads_no_further_ends_a_command_quietly() -> None:
+    """As ``certify | head``."""
+    with command('certify') as process:
+        assert process.stdout is not None and process.stderr is not None
+        process.stdout.close()
+        assert (process.wait(60.0), process.stderr.read()) == (141, '')
+
+
+def test_an_output_without_room_is_an_error() -> None:
+    with Path('/dev/full').open('w', encoding='utf-8') as full:
+        ended = subprocess.run([sys.executable, '-m', 'dmp_cpg_ros', 'certify'], stdout=full,
+                               stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+    assert ended.returncode == 2
+    assert 'No space left' in ended.stderr and ended.stderr.count('\n') == 1
+
+
+def test_a_terminal_need_not_have_every_character(bag: Path) -> None:
+    with command('analyze', bag, bag, PYTHONIOENCODING='ascii') as process:
+        said, errors = process.communicate(timeout=60.0)
+    assert process.returncode == 0, errors
+    assert '\\u0394' in said  # Δ
 
 
 def test_a_folder_is_no_file_to_write(tmp_path: Path) -> None:

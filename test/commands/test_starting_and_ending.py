@@ -8,6 +8,7 @@ import errno
 import fcntl
 import os
 import pty
+import re
 import select
 import signal
 import subprocess
@@ -256,6 +257,23 @@ def test_a_terminal_that_is_closed_ends_walk_in_order(
         process.kill()
         process.wait()
     assert (tmp_path / 'run' / 'bag' / 'metadata.yaml').is_file()
+
+
+def test_who_reads_no_further_ends_walk_in_order(processes: Processes, tmp_path: Path) -> None:
+    """As ``walk | head``, whose nodes get no exception."""
+    with subprocess.Popen(
+            [sys.executable, '-m', 'dmp_cpg_ros', 'walk', scenario(tmp_path, 600.0), '--lock-step',
+             '--composed', '--no-report', '--out', str(tmp_path / 'run')], text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=processes.environment) as process:
+        assert process.stdout is not None and process.stderr is not None
+        assert process.stdout.readline().startswith('brief: ')
+        assert process.stdout.readline().startswith('certificate: ')
+        process.stdout.close()
+        assert process.wait(RUN_S) == 128 + signal.SIGHUP
+        assert re.sub('reading: .*\n', '', process.stderr.read()).splitlines() == [
+            'walk: interrupted by SIGHUP; the recording up to here is complete',
+            'walk: making the metrics, which a second Ctrl-C skips']
+    assert (tmp_path / 'run' / 'metrics.json').is_file()
 
 
 @pytest.mark.parametrize('name', ['walk', 'mujoco_robot'])
