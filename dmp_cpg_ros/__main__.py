@@ -87,8 +87,8 @@ def run(name: str) -> int:
             print(f"dmp_cpg_ros: there is no '{name}'; {guess}valid are {', '.join(names)}",
                   file=sys.stderr)
             return BAD_INPUT
-        if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal need not have every character
-            sys.stdout.reconfigure(errors='backslashreplace')
+        if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.encoding.lower() != 'utf-8':
+            sys.stdout.reconfigure(errors='backslashreplace')  # print what a terminal lacks
         with _quiet_ctrl_c():
             module = import_module(_module(name))
             if _folder(name) == 'nodes':
