@@ -39,21 +39,18 @@ from dmp_cpg_ros.nodes.framework.judging import Later
 from dmp_cpg_ros.nodes.framework.known_stop import OthersKnow
 from dmp_cpg_ros.nodes.framework.promise import Present, Promises
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.framework.told_stop import ToldStop
 from dmp_cpg_ros.nodes.framework.waiting_requests import OVERTAKEN, WaitingRequests
-from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader, GaitMemoryWriter
+from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader
 from dmp_cpg_ros.nodes.messages.commands import read_votes
-from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsWriter, inhibition_state
 from dmp_cpg_ros.nodes.messages.interfaces import BLIND_NS, interface
 from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES, read_drive_mode
 from dmp_cpg_ros.nodes.messages.posture_feedback import BodyReader
 from dmp_cpg_ros.nodes.messages.reference import read_reference
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, read_imu
-from dmp_cpg_ros.nodes.messages.values import Array, stamp_ns, stamped
+from dmp_cpg_ros.nodes.messages.values import stamp_ns, stamped
 
 FOLLOWING = DRIVE_MODES[0]
-
-HEARTBEAT_NS = 100_000_000
-"""Time after which the gains are told again although they are the same [ns]."""
 
 JOIN_EVERY_S = 0.1
 """In lock-step, how often a restarted node looks whether it has been told what acts [s]."""
@@ -89,19 +86,13 @@ class InhibitionNode(SuiteNode):
         self._r, self._body_mode = np.zeros(3), 'standing'
         self._promises, self._anew = Promises(self, self.certified, self._network.gait), False
         self._waiting = WaitingRequests()
-        self._told_ns, self._blind = -HEARTBEAT_NS, ''
+        self._blind = ''
         self._drive, self._joined, self._asked = FOLLOWING, False, False
         self._began_ns = -1
         self._held: tuple[int, dict[str, Any]] | None = None
-        self._told: tuple[Any, ...] = ()
-        self._publisher = self.publisher('inhibition_state')
-        self._gains_writer = InhibitionGainsWriter()
-        self._gains_publisher = self.publisher('inhibition_gains')
+        self._told = ToldStop(self, tuple(gaits.gaits), self._voting.voting.voting)
         self._others = OthersKnow(self, self._take_up)
         self.listen('drive_mode', self._on_drive)
-        if self.lock_step or self.return_ns:
-            self._memory_writer = GaitMemoryWriter(tuple(gaits.gaits))
-            self._memory = self.publisher('gait_memory')
         if self.lock_step:
             self.look_every(JOIN_EVERY_S, self._try_again)
         else:
@@ -137,7 +128,7 @@ class InhibitionNode(SuiteNode):
         self._promises.take_over_parameters()
         self._anew |= self._is_on_its_way(self._state) or not (
             self._promises.holds_with(self.certified.running_in(self._network.gait)))
-        self._told = ()  # the certificate may be another one
+        self._told.forget()  # the certificate may be another one
 
     def _build(self) -> None:
         of = self.parameters_of
@@ -170,17 +161,16 @@ class InhibitionNode(SuiteNode):
         self._promises.due_ns += min(0, stamp_ns - before.time_ns)
         self._tell_block(before)
         balance = (self._state.share, self._state.quickness)
-        if (self._news() != self._told or self.lock_step
+        if (self._told.is_news(self._state, self._promises.latest)
                 or balance != (before.share, before.quickness)
-                or not 0 <= stamp_ns - self._told_ns < HEARTBEAT_NS):
-            self._publish_gains()
-            if self.return_ns:
-                self._publish_memory(stamp_ns)
+                or self._told.are_gains_due(stamp_ns)):
+            self._tell_gains()
+            if not self.lock_step:
+                self._tell_memory(stamp_ns)
         self._predict_what_is_new(before)  # takes several ticks, for which nobody is to wait
-        if self._news() != self._told:
-            self._publish()
+        self._tell_news()
         if self.lock_step:
-            self._publish_memory(stamp_ns)
+            self._tell_memory(stamp_ns)
         if self._blind:
             self._blind = ''
             self.clear('blind')
@@ -275,9 +265,9 @@ class InhibitionNode(SuiteNode):
         if not self._state.in_force or self._state.automatic and not automatic:
             self._state = self._supervisor.request(self._state, True, automatic)
             self._announce()
-            self._publish_gains()
+            self._tell_gains()
             self._predict()
-            self._publish()
+            self._tell_state()
 
     def _watch(self, now_ns: int) -> None:
         """Notice on the robot's clock that nothing is known of the gait any more."""
@@ -341,7 +331,7 @@ class InhibitionNode(SuiteNode):
             if stop:
                 self._state = self._supervisor.request(self._state, True)
                 self._announce()
-                self._publish_gains()
+                self._tell_gains()
             return False, (
                 f'{self._blind}: no time to rest can be promised' + (
                     '; the stop is requested and will be carried out' if stop else ''))
@@ -356,7 +346,7 @@ class InhibitionNode(SuiteNode):
                           else f'already {self._state.state}')
         if not self.lock_step:  # what it takes to predict must not delay it
             self._announce()
-            self._publish_gains()
+            self._tell_gains()
         self._waiting.acts(stop, answer)
         self._predict()
         return answer.delivered or answer
@@ -402,8 +392,8 @@ class InhibitionNode(SuiteNode):
         def known(error: Exception | None) -> None:
             self._waiting.predicted(self._told_of if error is None else (
                 lambda _: (True, f'{UNKNOWN}: {error}')))
-            if self.active and not self.lock_step and self._news() != self._told:
-                self._publish()
+            if self.active and not self.lock_step:
+                self._tell_news()
 
         canonical = CanonicalState(present, wanted, self._slow.gait.cadence_scale, self._x,
                                    self._x_dot, initial_contact_state())
@@ -416,48 +406,25 @@ class InhibitionNode(SuiteNode):
     def _words(self) -> str:
         return certificate_words(self.certified.certificate_in(self._network.gait))
 
-    def _news(self) -> tuple[Any, ...]:
-        """What is told when it changes."""
-        now = self._state
-        return (now.state, now.requested, now.armed, now.automatic, now.request_ns, now.voted,
-                now.tally.causes, now.tally.weights.tobytes(), now.leg, now.rest_phase,
-                now.block.acts, self._promises.latest)
-
     def _announce(self) -> None:
         """Let act what is to be told from now on."""
         self._announced = self._announced.after(
             self._state, self._supervisor.inhibition(self._state), self._lead_ns)
 
-    def _publish_gains(self) -> None:
-        self._told_ns, told = self._state.time_ns, self._announced
-        self._gains_publisher.publish(
-            self._gains_writer.fill(self._told_ns, told.latest, told.latest_ns))
+    def _tell_gains(self) -> None:
+        self._told.tell_gains(self._state.time_ns, self._announced)
 
-    def _publish_memory(self, stamp_ns: int) -> None:
-        self._memory.publish(self._memory_writer.fill(
-            stamp_ns, self._x, self._x_dot, self._slow.gait, self._r))
+    def _tell_memory(self, stamp_ns: int) -> None:
+        self._told.tell_memory(stamp_ns, self._x, self._x_dot, self._slow.gait, self._r)
 
-    def _publish(self) -> None:
-        state, acting, self._told = self._state, self._announced.latest, self._news()
-        promise = self._promises.latest
-        told = {'requested': state.in_force, 'armed': state.armed, 'automatic': state.automatic,
-                'pushed': state.push.acts, 'blocked': state.block.acts,
-                **_by_leg('gain', acting.gains), 'region_radius': acting.region_radius,
-                'rest_phase': acting.rest_phase,
-                'request_stamp': state.request_ns * 1e-9, 'predicted_s': promise.predicted_s,
-                'bound_s': promise.bound_s, 'bound_m': promise.bound_m,
-                'stands_s': promise.stands_s,
-                'measured_s': state.measured_s,
-                'certified': self.certified.certificate_in(self._network.gait).holds,
-                'grade': self._words()}
-        if self._voting.voting.voting:
-            told |= {**_by_leg('vote', state.tally.weights), 'voted': state.voted,
-                     'asked': state.asked, 'cause': state.tally.cause}
-        self._publisher.publish(inhibition_state(state.time_ns, state.state, told))
+    def _tell_news(self) -> None:
+        if self._told.is_news(self._state, self._promises.latest):
+            self._tell_state()
 
-
-def _by_leg(what: str, numbers: Array) -> dict[str, float]:
-    return {f'{what}_{leg}': number for leg, number in zip(LEGS, numbers.tolist(), strict=True)}
+    def _tell_state(self) -> None:
+        self._told.tell_state(self._state, self._announced, self._promises.latest, {
+            'certified': self.certified.certificate_in(self._network.gait).holds,
+            'grade': self._words()})
 
 
 def _vote_sensors(stamp_ns: int, values: dict[str, Any]) -> VoteSensors:

@@ -28,8 +28,9 @@ from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework import gait_memory
 from dmp_cpg_ros.nodes.framework.judging import Later
 from dmp_cpg_ros.nodes.framework.known_stop import BRIEF_NS, PATIENT_NS
+from dmp_cpg_ros.nodes.framework.told_stop import HEARTBEAT_NS
 from dmp_cpg_ros.nodes.framework.waiting_requests import PATIENCE_NS
-from dmp_cpg_ros.nodes.inhibition import HEARTBEAT_NS, InhibitionNode
+from dmp_cpg_ros.nodes.inhibition import InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.canonical_state import GaitMemoryWriter
 from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader, read_state_word
@@ -239,7 +240,7 @@ def test_a_restarted_node_tells_nothing_of_the_stop_before_it_knows_it(
         Parameter('lock_step', value=lock_step)]), []
     ros.nodes.append(node)
     node.trigger_configure()
-    node._publisher.publish = told.append  # type: ignore[method-assign]
+    node._told._state_publisher.publish = told.append  # type: ignore[method-assign]
     node.trigger_activate()
     _, state, tick = walked(300)
     tick_at(node, state, tick)
@@ -382,7 +383,7 @@ def test_a_stop_that_is_asked_for_while_nothing_is_known_of_the_gait_acts_at_onc
     node._watch(now + BLIND_NS + TICK)
     assert node.health.has_problem('blind') and not node._state.requested
     told: list[Any] = []
-    node._gains_publisher.publish = told.append  # type: ignore[method-assign]
+    node._told._gains_publisher.publish = told.append  # type: ignore[method-assign]
     accepted, answer = node._take_request(SetBool.Request(data=True))
     assert not accepted and 'no time to rest can be promised' in answer
     assert InhibitionGainsReader().read(told[-1]).requested
@@ -400,9 +401,9 @@ def test_the_gait_is_remembered_for_nodes_that_may_come_back(
     node, _ = watching(ros, KNOWN, parameters=parameters)
     remembered: list[Any] = []
     if parameters:
-        node._memory.publish = remembered.append  # type: ignore[method-assign]
+        node._told._memory_publisher.publish = remembered.append  # type: ignore[method-assign]
     else:
-        assert not hasattr(node, '_memory')
+        assert not hasattr(node._told, '_memory_publisher')
     _, state, tick = walked(300)
     for k in range(101):
         tick_at(node, state, tick, PATIENT_NS + k * TICK)
@@ -502,7 +503,7 @@ def test_gains_and_promise_go_on_when_the_clock_is_set_back(ros: Ros) -> None:
     node._take_request(SetBool.Request(data=True))
     due_s = 1e-9 * (node._promises.due_ns - now)
     told: list[Any] = []
-    node._gains_publisher.publish = told.append  # type: ignore[method-assign]
+    node._told._gains_publisher.publish = told.append  # type: ignore[method-assign]
     _, state, tick = walked(300)
     for k in range(1, 60):
         tick_at(node, state, tick, k * TICK)

@@ -67,8 +67,8 @@ class Gait:
             node.start()
             node.elapsed = 1e-9 * TICK_NS
         for link in self._links:
-            publish = self.inhibition._gains_publisher.publish
-            self.inhibition._gains_publisher.publish = (  # type: ignore[method-assign]
+            publish = self.inhibition._told._gains_publisher.publish
+            self.inhibition._told._gains_publisher.publish = (  # type: ignore[method-assign]
                 lambda message, link=link, publish=publish: (
                     link.send(self.ticks, message.serialized), publish(message)))
         self.tick()  # of stamp 0: the first of a run

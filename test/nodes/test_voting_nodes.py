@@ -27,7 +27,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.voting.votes import VoteInbox
 from dmp_cpg_ros.nodes.framework.ticks import HOLD_TICKS
-from dmp_cpg_ros.nodes.inhibition import HEARTBEAT_NS
+from dmp_cpg_ros.nodes.framework.told_stop import HEARTBEAT_NS
 from dmp_cpg_ros.nodes.messages.commands import read_votes
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.reference import ReferenceWriter
