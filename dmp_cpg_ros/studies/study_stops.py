@@ -17,6 +17,7 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby, product
 from math import isnan, pi
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
@@ -51,6 +52,9 @@ KEY, COUNTED = (('gait', 'speed', 'leg', 'cadence', 'braking', 'method'),
 
 FIRST = 'prediction error %'
 """Column that comes before the one of bounds."""
+
+TOLD_SHARES = 0.1, 0.15
+"""Shares of the time it was told to take by which a body may stand sooner or later."""
 
 COLUMNS = ('gait', 'm/s', 'leg', 'cadence', 'braking', 'stopped by', 'cases', 'fell', 'stood',
            'walked on', FIRST, 'over bound', *(name for name in SPREADS if name != FIRST))
@@ -100,6 +104,9 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
     print(f'{suite.file}: {len(cases)} stops; columns with two numbers are median / worst\n')
     told: Any = summarised(results, by_case=not options.random)
     print(table(told))
+    if any(_judged(*result) for result in results):
+        print(f'\nwhen the body stood, and was told to; earlier is least / median / most\n\n'
+              f'{table_of_told(results)}')
     if options.random:
         told = summary(cases, [outcome for _, outcome in results], options.seed)
         print(f'\n{scenario_bound(told)}')
@@ -157,6 +164,39 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
     return markdown_table(COLUMNS, [
         (*('' if row[name] is None else f'{row[name]:g}' if isinstance(row[name], float) else
            row[name] for name in KEY), *_cells(row)) for row in rows])
+
+
+def table_of_told(results: Results) -> str:
+    """Markdown table of when the body stood after a stop by inhibition, beside what was told: of
+    those that neither fell nor were stepped out of, which begins a stop anew.
+    """
+    rows: dict[tuple[str, ...], list[StopOutcome]] = {}
+    judged = [result for result in results if _judged(*result)]
+    for case, outcome in judged:
+        rows.setdefault((case.gait, case.leg, f'{case.cadence:g}', f'{case.braking:g}'),
+                        []).append(outcome)
+    rows['all', '', '', ''] = [outcome for _, outcome in judged]
+    within = (f'within {100.0 * share:g} %' for share in TOLD_SHARES)
+    return markdown_table(
+        ('gait', 'leg', 'cadence', 'braking', 'stops', *within, 'earlier s', 'over bound'),
+        [(*key, str(len(outcomes)), *_kept(outcomes)) for key, outcomes in rows.items()])
+
+
+def _judged(case: StopCase, outcome: StopOutcome) -> bool:
+    return case.method == METHODS[0] and not (
+        outcome.fell or outcome.stepped or isnan(outcome.stands_s))
+
+
+def _kept(outcomes: Sequence[StopOutcome]) -> tuple[str, ...]:
+    """How many stood when they were told to; by how much earlier, least, median and most; and how
+    many later than the bound.
+    """
+    early = [(of.stands_s - of.still_s, of.stands_s) for of in outcomes]
+    times = sorted(time for time, _ in early)
+    return (*(percent(sum(abs(time) <= share * told for time, told in early), len(early))
+              for share in TOLD_SHARES),
+            ' / '.join(f'{time:.2f}' for time in (times[0], median(times), times[-1])),
+            f'{sum(of.late for of in outcomes)}/{len(outcomes)}')
 
 
 def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:

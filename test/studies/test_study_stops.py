@@ -191,7 +191,7 @@ def test_the_command_prints_a_row_per_method_and_writes_its_numbers_and_every_ca
     for out in printed:
         assert table(written[0]) in out
         rows = [line for line in out.splitlines() if line.startswith('| trot')]
-        assert len(rows) == 1 and 'inhibition' in rows[0]
+        assert len(rows) == 2 and 'inhibition' in rows[0] and rows[1].count('|') == 10
 
 
 def test_the_numbers_of_a_row_are_those_of_its_stops_through_their_file() -> None:
@@ -219,6 +219,24 @@ def test_the_numbers_of_a_row_are_those_of_its_stops_through_their_file() -> Non
     assert again[1]['slip_m'] == [None, None] and np.isnan(second['slip_m']).all()
     assert [cell.strip() for cell in table(again).splitlines()[3].strip('|').split('|')][
         9:12] == ['-', '-', '-']
+
+
+def test_what_was_told_of_the_body_is_counted_of_the_stops_that_it_holds_for() -> None:
+    from dmp_cpg_ros.studies.study_stops import table_of_told
+
+    case = StopCase('trot', 0.5, 0.0, leg='auto', braking=3.0)
+    told = StopOutcome(False, True, stands_s=1.0, within_s=1.5)
+    outcomes = [replace(told, still_s=still) for still in (0.9, 0.86, 1.2, 1.6)]
+    none = [(case, StopOutcome(True, stands_s=1.0)), (case, StopOutcome(False)),
+            (case, replace(told, still_s=3.0, stepped=True)),
+            (replace(case, method='freeze'), replace(told, still_s=0.2))]
+    rows = table_of_told([*((case, one) for one in outcomes), *none]).splitlines()
+    cells = [[cell.strip() for cell in row.strip('|').split('|')] for row in rows]
+    assert cells[0] == ['gait', 'leg', 'cadence', 'braking', 'stops', 'within 10 %', 'within 15 %',
+                        'earlier s', 'over bound']
+    assert cells[2] == ['trot', 'auto', '1', '3', '4', '25 %', '50 %', '-0.60 / -0.05 / 0.14',
+                        '1/4']
+    assert len(cells) == 4 and cells[3] == ['all', '', '', '', *cells[2][4:]]
 
 
 @pytest.mark.parametrize('arguments', [['--gaits', 'gallop'], ['--phases', '0'], ['none.yaml']])
