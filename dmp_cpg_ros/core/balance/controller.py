@@ -217,7 +217,7 @@ class PostureController:
         return PostureState(stride.activity, integral, plan, offset, terrain), PostureFeedback(
             self._torque(body, legs, feet, stride, planned, self._bounce(gait, stride),
                          acceleration),
-            self._shift(stride, gait, measured, planned, beside, R_ground_base),
+            self._shift(stride, gait, plan.expected, measured, planned, beside, R_ground_base),
             np.array(self.placement.drift(
                 self.placement.yielding(p, stride.reference[0], gait.firm), measured, planned,
                 stride.activity.tolist(), sway.velocity)),
@@ -260,12 +260,13 @@ class PostureController:
         return (slope_lean * lean_x + outside * plan.curve[0] + aside_x,
                 slope_lean * lean_y + outside * plan.curve[1] + aside_y)
 
-    def _shift(self, stride: Stride, gait: GaitInForce, measured: Triple, planned: Triple,
-               beside: Pair, R_ground_base: Matrix) -> Array:
+    def _shift(self, stride: Stride, gait: GaitInForce, expected: Pair, measured: Triple,
+               planned: Triple, beside: Pair, R_ground_base: Matrix) -> Array:
         """Shift of the footholds of swinging feet, ndarray (4, 3) [m]."""
         p, (beside_x, beside_y) = self.parameters, beside
         caught = self.placement.caught(measured, planned, gait.apart)
-        lanes = self.lanes.aside(gait, stride.reference[0], stride.omega, stride.duty)
+        lanes = self.lanes.aside(
+            gait, (*expected, stride.reference[2]), stride.omega, stride.duty)
         shift = [
             (along + beside_x, across + (beside_y + aside)) for (along, across), aside in zip(
                 self.placement.shift(p, caught, planned, pi * stride.duty / stride.omega), lanes,
