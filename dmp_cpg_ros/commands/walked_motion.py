@@ -69,8 +69,8 @@ def read_motion(path: Path, topic: str = 'joint_targets', robot_file: Path | Non
     if topic not in ('joint_targets', 'joint_states'):
         raise DataError(f"a motion is learned from joint_targets or joint_states, not '{topic}'")
     run = run_of(bag.find_bag(path), path)
-    known = {} if run is None else read_json(run / 'manifest.json')
-    parameters = known.get('parameters') or {}
+    told = {} if run is None else read_json(run / 'manifest.json')
+    parameters = told.get('parameters') or {}
     context, _ = run_context(parameters, robot_file)
     recording = load_recording(path, joint_names=context.joint_names)
     joints = recording.targets if topic == 'joint_targets' else recording.joints
@@ -80,12 +80,18 @@ def read_motion(path: Path, topic: str = 'joint_targets', robot_file: Path | Non
         parameters = {'gait': walked}
         context, _ = run_context(parameters, robot_file)
     rows, at, attitude = motion.common_rows(joints.time, canonical.time, recording.odometry.time)
-    if not len(rows):
-        raise DataError(f"'{path}': no stamp has all of {topic}, canonical_state and "
+    nowhere = DataError(f"'{path}': no stamp has all of {topic}, canonical_state and "
                         'ground_truth or odom')
-    missing = [JOINT_NAMES[j] for j in np.flatnonzero(np.isnan(joints.position[rows]).any(axis=0))]
+    if not len(rows):
+        raise nowhere
+    known = ~np.isnan(joints.position[rows])  # (n, 12)
+    missing = [JOINT_NAMES[j] for j in np.flatnonzero(~known.any(axis=0))]
     if missing:
         raise DataError(f"'{path}': {topic} lacks the joints {', '.join(missing)}")
+    whole = known.all(axis=1)  # messages are lost, and the end comes within a tick
+    if not whole.any():
+        raise nowhere
+    rows, at, attitude = rows[whole], at[whole], attitude[whole]
     if context.robot is None or context.gait is None:
         raise DataError(f"'{path}': the robot or the gait that walked is not known here")
     gaits = episodes.gait_rows(recording, context)

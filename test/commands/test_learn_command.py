@@ -7,19 +7,24 @@ from __future__ import annotations
 import subprocess
 import sys
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from demonstrations import joint_angles, walking_joints
+from synthetic_bag import write_bag as write_recording
+from synthetic_walk import SyntheticWalk
 
 from dmp_cpg_ros.commands import learn, walked_motion
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration
 from dmp_cpg_ros.commands.learn import main
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
+from dmp_cpg_ros.commands.run_folder import run_context
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
+from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.primitive_files import load_primitive
 
 WALK, REACH = walking_joints(0.5, 2.6, dt=0.005), joint_angles(dt=0.004)
@@ -351,6 +356,26 @@ def test_a_motion_needs_the_recording_of_a_walk(tmp_path, capsys):
     assert main([str(table)]) == BAD_INPUT
     assert '--out FILE or --motion FILE' in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_a_motion_is_learned_where_messages_of_legs_are_lost(tmp_path, capsys):
+    """As at the end of every recording in real time, which comes within a tick."""
+    context, _ = run_context({'gait': 'amble'}, None)
+    scale = body_scale(context.robot)
+    omega = float(context.gait.omega(scale.foot_speed(0.4, 0.0, 0.0), scale))
+    walk = SyntheticWalk(cadence_hz=omega / (2.0 * np.pi), end_s=9.0).recording()
+    position = walk.targets.position.copy()
+    position[-1, 6:] = np.nan
+    position[500, :3] = np.nan
+    lost = replace(walk, targets=replace(walk.targets, position=position))
+    none = replace(walk, targets=replace(walk.targets, position=np.where(
+        np.arange(12) < 3, np.nan, position)))
+    counts = [[len(foot.foot) for (foot,) in walked_motion.read_motion(
+        write_recording(of, tmp_path / name))[0]] for name, of in (('all', walk), ('lost', lost))]
+    assert counts[1] == [count - 2 for count in counts[0]]
+    bag = write_recording(none, tmp_path / 'none')
+    assert main([str(bag), '--motion', str(tmp_path / 'motion.yaml')]) == BAD_INPUT
+    assert 'lacks the joints fl_abduction, fl_hip, fl_knee' in capsys.readouterr().err
 
 
 def test_a_bare_bag_has_nothing_to_do_with_a_manifest_beside_it(tmp_path, monkeypatch):
