@@ -14,7 +14,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
@@ -87,14 +87,14 @@ def run(name: str) -> int:
             print(f"dmp_cpg_ros: there is no '{name}'; {guess}valid are {', '.join(names)}",
                   file=sys.stderr)
             return BAD_INPUT
-        if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.encoding.lower() != 'utf-8':
-            sys.stdout.reconfigure(errors='backslashreplace')  # print what a terminal lacks
+        if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal need not have every character
+            with suppress(OSError):  # whoever is forked may have a pipe where a file was
+                sys.stdout.reconfigure(errors='backslashreplace')
         with _quiet_ctrl_c():
             module = import_module(_module(name))
             if _folder(name) == 'nodes':
                 module = import_module(f'{PACKAGE}.nodes.framework.execution')
-        return _to_the_end(module.run_node, name) if _folder(name) == 'nodes' else (
-            _to_the_end(module.main))
+        return int(module.run_node(name) if _folder(name) == 'nodes' else module.main())
     except KeyboardInterrupt:
         return INTERRUPTED
     except ImportError as error:
@@ -134,20 +134,6 @@ def _of_distribution() -> bool:
 
     return sys.prefix == sys.base_prefix and os.path.isfile(
         os.path.join(sysconfig.get_path('stdlib'), 'EXTERNALLY-MANAGED'))
-
-
-def _to_the_end(body: Callable[..., int], *arguments: str) -> int:
-    """Exit status of a body, which a Ctrl-C that comes after it does not change: Python gives
-    signals back to Linux before it has ended, and Linux would end the process by this one.
-    """
-    try:
-        try:
-            return int(body(*arguments))
-        finally:
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
-    except KeyboardInterrupt:  # in the body, or just after it
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        return INTERRUPTED
 
 
 @contextmanager

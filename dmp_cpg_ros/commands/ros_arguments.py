@@ -25,6 +25,9 @@ UNREAD = 128 + 13
 LONGEST_LINE = 5000
 """Length of an error on the terminal; the names of all parameters fit."""
 
+LONGEST_NAMESPACE = 160
+"""Length of a namespace with which the longest names of topics and services still fit."""
+
 LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 """Log levels of ROS; Python's have the same names."""
 
@@ -205,9 +208,11 @@ def checked_namespace(text: str) -> str:
     words = text.strip('/')
     if not words:
         return ''
-    if not all(word.isidentifier() and word.isascii() for word in words.split('/')):
+    if not all(word.isidentifier() and word.isascii() and '__' not in word
+               for word in words.split('/')) or len(words) > LONGEST_NAMESPACE:
         raise ParameterError(f"'{text}' is no namespace; valid are words of letters, digits and "
-                             "underscores with '/' between, such as /robot1")
+                             "single underscores with '/' between, such as /robot1, of up to "
+                             f'{LONGEST_NAMESPACE} characters in all')
     return f'/{words}'
 
 

@@ -364,6 +364,8 @@ def test_commands_take_what_launch_adds(
     (['--ros-args', '--log-level', 'loud'], 'debug, info'),
     (['--ros-args', '-r', '__ns:=/a b'], 'is no namespace'),
     (['--namespace', '1st'], 'is no namespace'),
+    (['--namespace', 'a__b'], 'is no namespace'),
+    (['--namespace', 'a' * 161], 'is no namespace'),
     (['startstop'], 'did you mean scenarios/start_stop?'),
 ])
 def test_walk_refuses_what_is_wrong_and_says_what_is_valid(
