@@ -75,8 +75,9 @@ class ProcessGroup:
             if name not in self._ends and (status := process.poll()) is not None:
                 how = (f'was ended by signal {-status} ({signal.Signals(-status).name})'
                        if status < 0 else f'ended with status {status}')
-                log = (self._logs / f'{name}.log').read_text(encoding='utf-8', errors='replace')
-                last = log.strip().rpartition('\n')[2]
+                log = self._logs / f'{name}.log'  # who writes to the terminal has none
+                text = log.read_text(encoding='utf-8', errors='replace') if log.is_file() else ''
+                last = text.strip().rpartition('\n')[2]
                 self._ends[name] = f'{name} {how}{last and ": " + last}'
         return dict(self._ends)
 

@@ -93,7 +93,8 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
             player = ScenarioPlayer(scenario, tick_ns, lock_step, say, stamped=stamped)
             executor = execution.make_executor('events')
             executor.add_node(player)
-            watch = SuiteWatch(executor, player, group, interrupted, say, shared, respawn)
+            watch = SuiteWatch(executor, player, group, views, interrupted, say, shared,
+                               respawn)
             try:
                 watch.until_ready()
                 player.begin()

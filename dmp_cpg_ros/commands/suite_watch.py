@@ -78,6 +78,8 @@ class SuiteWatch:
         Who plays the scenario.
     group : ProcessGroup
         Processes of the nodes.
+    views : ProcessGroup
+        Processes that only look on; the walk goes on without them.
     interrupted : list of int
         Signals that ask for the end, as they come.
     say : callable (time_s, text)
@@ -94,10 +96,10 @@ class SuiteWatch:
     """
 
     def __init__(self, executor: Executor, player: ScenarioPlayer, group: ProcessGroup,
-                 interrupted: list[int], say: Say, shared: Mapping[str, Sequence[str]],
-                 respawn: bool) -> None:
+                 views: ProcessGroup, interrupted: list[int], say: Say,
+                 shared: Mapping[str, Sequence[str]], respawn: bool) -> None:
         """Create the clients, and hear what is recorded."""
-        self._executor, self._player, self._group = executor, player, group
+        self._executor, self._player, self._group, self._views = executor, player, group, views
         self._interrupted, self._say = interrupted, say
         self._shared, self._respawn = shared, respawn
         self._gone: set[str] = set()  # nodes that have ended and are not started again
@@ -127,6 +129,10 @@ class SuiteWatch:
 
     def _look_after_processes(self) -> None:
         """Start what has ended again, or raise SuiteError with how it ended, once."""
+        for name, how in self._views.ended().items():
+            if name not in self._told:
+                self._told.add(name)
+                self._say(self._player.progress_ns * 1e-9, f'{how}; the walk goes on without it')
         news = {name: how for name, how in self._group.ended().items() if name not in self._told}
         for name, how in news.items():
             nodes = self._shared[name]

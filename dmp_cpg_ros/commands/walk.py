@@ -313,7 +313,8 @@ def _parser() -> argparse.ArgumentParser:
     sharing.add_argument('--composed', dest='processes', action='store_const', const='composed',
                          help='all nodes in one process and one executor')
     add('--respawn', action='store_true',
-        help='start processes that end before their time again, all but the robot')
+        help='start processes that end before their time again, all but the robot and what only '
+        'looks on')
     add('--robot', metavar='FILE',
         help='robot file, by its path or in config/robots (default: that of the parameter file)')
     add('--motion', metavar='FILE', help='motion of the feet, from learn --motion')

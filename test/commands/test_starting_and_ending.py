@@ -229,6 +229,19 @@ def test_a_walk_goes_on_without_its_recorder_and_says_so_at_once(
     assert f'; see {tmp_path}' not in process.output  # the scenario was played to its end
 
 
+def test_a_walk_says_at_once_that_nobody_shows_it_any_more(
+        processes: Processes, tmp_path: Path) -> None:
+    process = walk(processes, scenario(tmp_path, 4.0), '--lock-step', '--visualization', '--view',
+                   '--out', str(tmp_path / 'run'), '--no-report', '--composed', '--rate',
+                   str(SHARED_HZ))
+    process.wait_for_output('  walking\n', RUN_S)
+    for name in ('live_view', 'visualization'):
+        os.kill(process.pid_of(name), signal.SIGKILL)
+        process.wait_for_output(
+            rf' s  {name} was ended by signal 9 .*; the walk goes on without it', RUN_S)
+    assert process.wait(RUN_S) == 0, str(process)
+
+
 def test_a_terminal_that_is_closed_ends_walk_in_order(
         processes: Processes, tmp_path: Path) -> None:
     """What walk has to say then goes nowhere, and is no reason to end otherwise."""
