@@ -107,6 +107,7 @@ class SuiteWatch:
         self._restarts: Counter[str] = Counter()  # since all were ready
         self._returning: health.ReadinessOfOthers | None = None
         self._progress: tuple[int, bool] | None = None
+        self._stood_ns = -1  # robot time when progress was looked at last
         self._stalled, self._stalled_s = health.Intervals(FIRST_WORD_S), 0.0
         self._asked: health.ReadinessOfOthers | None = None
         self._hung_ns = -1  # robot time at which somebody hung last
@@ -169,10 +170,13 @@ class SuiteWatch:
         if self._progress is None or progress != self._progress and progress[1]:
             if self._asked is not None:
                 self._asked.end()
-            self._progress, self._asked = progress, None
+            self._progress, self._asked, self._stood_ns = progress, None, progress[0]
             self._stalled, self._stalled_s = health.Intervals(FIRST_WORD_S), now
         elif self._stalled.due() and progress[0] > 0 and self._returning is None:
-            if not player.busy:
+            # Ticks that go on while the robot looks after itself need no word, and shall not have
+            # one by the wall clock.
+            stands, self._stood_ns = progress[0] == self._stood_ns, progress[0]
+            if stands and not player.busy:
                 player.remind()
             asked, self._asked = self._asked, health.ReadinessOfOthers(
                 player, list(self._transitions))

@@ -175,6 +175,19 @@ def test_a_node_that_stands_still_for_a_while_is_followed_again(
     assert tilt(load_recording(tmp_path / 'run').odometry.quaternion).max() < 0.5
 
 
+def test_in_lock_step_no_tick_is_told_again_because_the_robot_looks_after_itself_for_long(
+        processes: Processes, tmp_path: Path) -> None:
+    """How long is wall time, of which the published bytes tell nothing."""
+    failure = {'at': 1.0, 'fail': {'component': 'link', 'kind': 'off', 'for_s': 9.0, 'leg': 'rl'}}
+    process = walk(processes, tmp_path, 11.0, '--lock-step', '--composed', '--no-report', '--set',
+                   'failures_allowed:=true', events=[failure])
+    assert process.wait(RUN_S) == 0, str(process)
+    for kind in ('looks after itself: stand', 'follows its legs again'):
+        assert f'  the robot {kind}' in process.output
+    recording = load_recording(tmp_path / 'run')
+    assert recording.counts['/joint_states'] == len(recording.joints.time)
+
+
 def test_in_lock_step_the_walk_waits_for_nodes_that_stand_still(
         processes: Processes, tmp_path: Path) -> None:
     process = walk(processes, tmp_path, 4.0, *LOCK_STEP)
