@@ -13,8 +13,9 @@ legs can vote, a majority stops the gait and fewer do not, (j) capture bears del
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 
@@ -61,16 +62,16 @@ def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = Fal
     -------
     Certificate
     """
-    p = s.parameters.inhibition
+    p, votes = s.parameters.inhibition, cache(partial(vote_inequalities, s))  # of all legs alike
     if not p.auto:
-        return _certificate(s, required_only, until_lost)
+        return _certificate(s, required_only, until_lost, votes)
     legs = legs or eligible_legs(s.network, p)
     number = degrees(s.network.parameters.coupling_graph, len(LEGS))
     found = []
     for leg in {number[leg]: leg for leg in legs}.values():       # others are alike
         found.append(_certificate(replace(s, parameters=replace(
             s.parameters, inhibition=replace(p, inhibited_legs=(LEGS[leg],)))),
-            required_only, until_lost))
+            required_only, until_lost, votes))
         if until_lost and not found[-1].holds:
             return found[-1]
     rows = [min(same, key=lambda row: (row.holds, row.margin))
@@ -87,7 +88,8 @@ def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = Fal
         legs=tuple(LEGS[leg] for leg in sorted(legs)))
 
 
-def _certificate(s: Setting, required_only: bool, until_lost: bool) -> Certificate:
+def _certificate(s: Setting, required_only: bool, until_lost: bool,
+                 votes: Callable[[], list[Inequality]]) -> Certificate:
     p, network = s.network.parameters, s.network
     analysis = of_network.analyse_network(network, s.parameters.inhibition, s.span)
     found, contraction = analysis.found, analysis.contraction
@@ -129,7 +131,7 @@ def _certificate(s: Setting, required_only: bool, until_lost: bool) -> Certifica
                    CONTINUOUS, 'from release at rest to locked phases and full swings', False)]
     rows = discharged(rows, alike=s.alike)
     if not until_lost or all(row.holds or not row.required for row in rows):
-        rows += vote_inequalities(s)
+        rows += votes()
     return Certificate(
         tuple(rows), contraction.reach, s.span.omega[1], stop, start,
         () if rest is None else tuple(rest.phase_ahead.tolist()),
