@@ -66,7 +66,7 @@ class CanonicalOscillators(SuiteNode):
         self._canonical = self.certified.running_gait(quarter_weight(description_of(self)))
         gaits = self.certified.gaits
         self._state = self._canonical.initial_state(gaits.named(gait_name(self)), inhibition)
-        self._inhibition = initial_inhibition(
+        self._inhibition = self._latest = initial_inhibition(
             inhibition, self.parameters_of(CanonicalParameters).first_leg)
         self._silent: SilentStop | None = None
         self._known = KnownStop(self, 'acting_gains')
@@ -130,7 +130,7 @@ class CanonicalOscillators(SuiteNode):
         if gains is None:
             return
         known_ns, announced = gains
-        self._inhibition = announced.at(stamp_ns).acting
+        self._inhibition, self._latest = announced.at(stamp_ns).acting, announced.latest
         if self.lock_step or fresh(known_ns, stamp_ns, SILENT_NS + self.return_ns):
             if self._silent is not None:
                 self._silent = None
@@ -142,13 +142,14 @@ class CanonicalOscillators(SuiteNode):
                 self.warn('inhibition', 'inhibition is silent: the gait stops until it is back',
                           error=True)
             known_ns, self._inhibition = stamp_ns, self._silent.inhibition
+            self._latest = self._inhibition
         self._known.learn(known_ns, self._inhibition)
 
     def _acting(self) -> Acting:
         state = self._state
-        return Acting(
+        return Acting(  # legs may be caught from when what is armed now acts
             state.cadence_scale,
-            (self._canonical.network(state.gait), self._inhibition, state.x),
+            (self._canonical.network(state.gait), self._latest, state.x),
             (*state.gait.ends, state.wanted))
 
     def _watch_phases(self, network: GaitNetwork, r: Any, dt: float) -> None:

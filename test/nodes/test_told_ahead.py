@@ -120,3 +120,24 @@ def test_requests_are_carried_out_as_predicted_whenever_they_are_heard_within_th
         missed += [gait.missed(True), gait.missed(False)]
     assert (max(map(abs, missed)) < 1e-9) == kept
     gait.end()
+
+
+def test_no_parameter_of_what_captures_changes_once_it_is_told_that_legs_may_be_caught(
+        ros: Ros) -> None:
+    gait = Gait(ros, 7, 0, 1e-9 * TICK_NS * 20)
+    for _ in range(200):
+        gait.tick()
+    gait.inhibition._take_request(SetBool.Request(data=True))
+
+    def refused() -> str:
+        result = gait.canonical.set_parameters([Parameter('coupling_gain', value=90.0)])[0]
+        return '' if result.successful else str(result.reason)
+
+    while not gait.inhibition._state.armed:
+        gait.tick()
+    for _ in range(2):  # of the one it is told, and it is heard
+        gait.tick()
+    assert gait.inhibition._announced.latest.gains.any()
+    assert not gait.canonical._inhibition.gains.any()
+    assert 'while the legs are being captured' in refused()
+    gait.end()
