@@ -289,6 +289,10 @@ class WalkingLoop:
         """What runs, in the gait in force or in the change between two when a request acts."""
         gait = next_gait(self.reference, self.canonical, Announced(self.inhibition), self.canon,
                          self.r, self._foreseen, self._dt)
+        return self._described_in(gait)
+
+    def _described_in(self, gait: GaitInForce) -> Running:
+        """What a certificate is computed from in a gait, or in a change between two."""
         first, *others = (self._reader.named(end.name) for end in gait.ends)
         return replace(self._described(self.parameters, first), others=tuple(others))
 

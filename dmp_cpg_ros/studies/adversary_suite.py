@@ -18,6 +18,7 @@ from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.suite_parameters import OWNER
 from dmp_cpg_ros.core.voting.parameters import SUM, WINNER_TAKE_ALL
 from dmp_cpg_ros.studies.draws import Case, log_uniform
 from dmp_cpg_ros.studies.oscillator_loop import GAITS, Oscillators
@@ -53,9 +54,9 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
     description : RobotDescription
         The robot.
     case : dict
-        ``gait``, ``tick_s``, ``parameters`` by name, and ``events``: lists of a wait [s], a kind
-        (``stop``, ``start``, ``command``, ``set``, ``gait``, ``vote``, ``push``, ``take_over``)
-        and a value.
+        ``gait``, ``tick_s``, ``parameters`` by name, perhaps ``lead_s`` (``request_lead``), and
+        ``events``: lists of a wait [s], a kind (``stop``, ``start``, ``command``, ``set``,
+        ``gait``, ``vote``, ``push``, ``take_over``) and a value.
     weaken : str
         What is left out, one of ``CONDITIONS``.
     counts : Counter, optional
@@ -85,7 +86,7 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
             way += case['tick_s'] * float(np.hypot(*loop.r[:2]))
             if not np.all(np.isfinite(loop.x)):
                 return 'the oscillators diverge', closest
-            if held and loop.inhibition.requested and not loop.held:
+            if held and loop.acting.requested and not loop.held:
                 return 'C is left again', closest
             if np.abs(turned).max() > STRIDE:
                 return 'a leg takes a stride while the stop is in force', closest
@@ -128,15 +129,16 @@ def _kept(loop: Oscillators, expected: _Expected, way: float, tick_s: float) -> 
 def _do(loop: Oscillators, kind: str, value: Any, expected: _Expected | None,
         counts: Counter[str]) -> _Expected | None:
     """Do what an event says; what is expected of the stop or the start that is under way."""
-    if loop.inhibition.requested if kind == 'take_over' else (
+    if loop.inhibition.requested and not loop.lead_s if kind == 'take_over' else (
             kind == 'stop' and not loop.stop.requested):
         return _promised(loop, loop.take_over if kind == 'take_over' else None)
     if kind in ('stop', 'take_over'):
         return expected
     if kind == 'start':
-        bound = loop.in_force().certificate().time_to_walking if loop.certified() else np.inf
         news = loop.stop.requested
         predicted = loop.request(False)
+        bound = loop.lead_s + (
+            loop.in_force().certificate().time_to_walking if loop.certified() else np.inf)
         if not news or loop.stop.requested or predicted == np.inf:
             return None
         return _Expected(loop.now_ns, False, bound, predicted)
@@ -144,8 +146,8 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: _Expected | None,
         loop.command(*value)
         if expected is not None and not expected.stop:
             return None
-        if expected is not None and expected.since_ns == loop.now_ns:
-            return _promised(loop)  # it acts for the tick until the request does
+        if expected is not None and loop.on_its_way:
+            return _promised(loop)  # it acts until the request does
     elif kind == 'vote':
         loop.vote(value)
         return None
@@ -165,11 +167,10 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: _Expected | None,
 
 def _promised(loop: Oscillators, predict: Callable[[], float] | None = None) -> _Expected:
     """What is said of a stop that is requested now or is under way."""
-    bound = loop.time_to_rest() if loop.certified() else np.inf
-    way = loop.in_force().stop_distance(loop.r, loop.gate.foreseen(loop.now_ns + loop.tick_ns))
     predicted = predict() if predict is not None else loop.request(True)
+    bound = loop.time_to_rest() if loop.certified() else np.inf
     predicted = min(predicted, LONGEST) if not loop.voted_now else np.nan
-    return _Expected(loop.now_ns, True, bound, predicted, way)
+    return _Expected(loop.now_ns, True, bound, predicted, loop.stop_distance())
 
 
 _NUMBERS = {'coupling_gain': (8.0, 400.0), 'rho': (0.5, 20.0), 'inhibition_gain': (60.0, 4000.0),
@@ -194,11 +195,13 @@ def _change(rng: np.random.Generator, names: Sequence[str]) -> Case:
 
 
 _LIMITS = {'max_lateral_speed': 0.0, 'max_turn_rate': 0.0}
-_TELLING = {'places': 0, 'acting': 1, 'holding': 2, 'arming': 4}
+_TELLING = {'places': 0, 'acting': 1, 'holding': 2, 'arming': 4, 'leads': 5, 'way': 5}
 """Which of the sequences that once told something is about a condition."""
 _GUIDED = {'arming': {'alpha_r': (0.7, 4.0), 'max_speed': (1.0, 4.0)},
            'acting': {'alpha_r': (3.0, 20.0), 'max_speed': (0.3, 2.0),
-                      'cadence_scale': (0.25, 0.5), 'gait_change_rate': (0.05, 0.25)}}
+                      'cadence_scale': (0.25, 0.5), 'gait_change_rate': (0.05, 0.25)},
+           'leads': {'alpha_r': (3.0, 20.0), 'cadence_scale': (1.0, 3.0)},
+           'way': {'max_speed': (0.3, 2.0)}}
 """Parameters with which a condition that is left out shows."""
 
 
@@ -212,7 +215,7 @@ def setting(rng: np.random.Generator, weaken: str = '') -> Case:
     if guided:
         parameters |= {name: log_uniform(rng, *span) for name, span in guided.items()}
         return {'gait': str(rng.choice(list(GAITS))), 'tick_s': 0.004, 'events': [],
-                'parameters': parameters}
+                'lead_s': 0.2 if weaken in ('leads', 'way') else 0.0, 'parameters': parameters}
     if rng.random() < 0.2:
         parameters |= {'voting': True, 'vote_fade': float(rng.uniform(0.05, 3.0)),
                        'vote_majority': int(rng.integers(1, 5)),
@@ -222,7 +225,8 @@ def setting(rng: np.random.Generator, weaken: str = '') -> Case:
             parameters['vote_limit'] = float(rng.uniform(0.05, 1.0))
         parameters['silence_weight'] = 0.0   # silent sensors vote after what is predicted
     return {'gait': str(rng.choice(list(GAITS))), 'parameters': parameters,
-            'tick_s': float(rng.choice([0.001, 0.002, 0.004, 0.004, 0.01])), 'events': []}
+            'tick_s': float(rng.choice([0.001, 0.002, 0.004, 0.004, 0.01])), 'events': [],
+            'lead_s': float(rng.choice([0.0, 0.024, log_uniform(rng, 0.002, 0.2)]))}
 
 
 def random_events(rng: np.random.Generator, voting: bool, weaken: str = '') -> list[list[Any]]:
@@ -259,7 +263,8 @@ def _changing(rng: np.random.Generator) -> tuple[str, Any]:
     """Another gait or another value of a parameter."""
     if rng.random() < 0.3:
         return 'gait', str(rng.choice(list(GAITS)))
-    return 'set', _change(rng, [*_NUMBERS, 'inhibited_legs', 'coupling_graph'])
+    names = OWNER.keys() & {*_NUMBERS, 'inhibited_legs', 'coupling_graph'}
+    return 'set', _change(rng, sorted(names))
 
 
 def _votes(rng: np.random.Generator) -> Case:
@@ -286,7 +291,7 @@ def _telling(rng: np.random.Generator, voting: bool, about: int | None = None
         return [entry for _ in range(2) for entry in (
             [2.0, 'vote', _votes(rng)],
             *([4.0 * soon(), *_changing(rng)] for _ in range(3)), [3.0, 'start', None])]
-    kind = rng.integers(5) if about is None else about
+    kind = rng.integers(6) if about is None else about
     if kind == 0:                                            # stops within starts
         return [entry for _ in range(3) for entry in (
             [2.0, 'stop', None], [2.0, 'start', None], [soon(), 'stop', None],
@@ -301,12 +306,17 @@ def _telling(rng: np.random.Generator, voting: bool, about: int | None = None
                 [1.0, 'set', change('cadence_scale')], [soon(), 'stop', None]]
     if kind == 2:                                            # changes at rest
         return [[1.0, 'stop', None], *([2.0, 'set', change(
-            'inhibited_legs', 'coupling_gain', 'inhibition_gain', 'region_radius', 'rho',
-            'radius')] for _ in range(3)), [2.0, 'start', None]]
+            'inhibited_legs', 'coupling_gain', 'inhibition_gain', 'region_radius', 'rho')]
+            for _ in range(3)), [2.0, 'start', None]]
     if kind == 3:                                            # stops of a robot that was pushed
         return [entry for _ in range(3) for entry in (
             [soon(), 'push', _push(rng)], [soon(), 'stop', None], [soon(), 'push', _push(rng)],
             [2.0, 'start', None])]
+    if kind == 5:                                            # requests that overtake others
+        return [entry for _ in range(3) for entry in (
+            [2.0 + soon(), 'stop', None], [0.1 * soon(), *_changing(rng)],
+            [0.1 * soon(), 'start', None], [0.1 * soon(), 'stop', None], [0.1 * soon(), 'command',
+            [float(rng.uniform(0.0, 3.0)), 0.0, 0.0]], [3.0, 'start', None])]
     lower = _LIMITS if rng.random() < 0.5 else {}
     return [[0.0, 'command', [3.0, 0.0, 0.0]],
             [1.5, 'set', change('max_speed', 'alpha_r') | lower], [soon(), 'stop', None]]

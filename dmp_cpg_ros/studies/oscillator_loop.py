@@ -18,7 +18,7 @@ from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.handover import adopted
-from dmp_cpg_ros.core.inhibition.prediction import look_ahead
+from dmp_cpg_ros.core.inhibition.prediction import look_ahead, next_gait
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.maths import Array
@@ -29,9 +29,10 @@ from dmp_cpg_ros.core.voting.voters import VoteSensors
 from dmp_cpg_ros.studies.draws import Case
 from dmp_cpg_ros.suite import load_gaits
 
-CONDITIONS = ('places', 'arming', 'acting', 'holding')
+CONDITIONS = ('places', 'arming', 'acting', 'holding', 'leads', 'way')
 """Conditions that can be left out, to see whether the search notices: without ``places``
-inhibition is armed at once and switches each leg by its own region.
+inhibition is armed at once and switches each leg by its own region, and without ``leads`` and
+``way`` the bounds of a stop that acts later are those of one which acts at the next tick.
 """
 
 GAITS = load_gaits()
@@ -49,7 +50,8 @@ class Oscillators(WalkingLoop):
                          start.changed(case['parameters']).parameters, GAITS)
         self._dt, self._weaken, self.now_ns = case['tick_s'], weaken, 0
         self._margins, self._pushed_until_ns = (np.inf,) * 4, 0
-        self._voted_ns = -1
+        self._voted_ns, self._lead_ns = -1, round(1e9 * case.get('lead_s', 0.0))
+        self._announced = Announced(self.inhibition)
         nothing = np.full(3, np.nan)
         self._sensors = VoteSensors(0, 0, np.full(4, 0.25), nothing, nothing)
         self._leave_out_places()
@@ -76,17 +78,57 @@ class Oscillators(WalkingLoop):
         """Whether the present parameters have a certificate."""
         return self.in_force().certificate().holds
 
+    @property
+    def lead_s(self) -> float:
+        """Time after which a request acts, and what is armed [s]; 0: at the next tick."""
+        return 1e-9 * self._lead_ns
+
+    @property
+    def on_its_way(self) -> bool:
+        """Whether the last request does not act yet at the next tick."""
+        return self.now_ns - self.stop.request_ns < max(
+            self.tick_ns, self._lead_ns - self.tick_ns)
+
+    @property
+    def acting(self) -> Inhibition:
+        """Inhibition that acts at the next tick."""
+        return self._announced.at(self.now_ns + self.tick_ns).acting
+
     def time_to_rest(self) -> float:
-        """Bound that is stated for a stop now [s]."""
+        """Bound that is stated for a stop that was requested now [s]."""
+        leads = 0.0 if self._weaken == 'leads' else 2.0 * self.lead_s  # of the request, of arming
         if self._weaken == 'arming':
-            return self.in_force().certificate().time_to_rest
-        return super().time_to_rest()
+            return self.in_force().certificate().time_to_rest + leads
+        return super().time_to_rest() + leads
+
+    def stop_distance(self) -> float:
+        """Bound that is stated on the way of the reference in such a stop [m]."""
+        return self.in_force().stop_distance(
+            self.r, self._foreseen, 0.0 if self._weaken == 'way' else self.lead_s)
+
+    def request(self, stop: bool) -> float:
+        """Request a stop or a start; what is told ahead is told before it is predicted."""
+        if not self._lead_ns:
+            return super().request(stop)
+        self.stop = self.supervisor.request(self.stop, stop)
+        self.inhibition = self.supervisor.inhibition(self.stop)
+        self._announced = self._announced.after(self.stop, self.inhibition, self._lead_ns)
+        return look_ahead(
+            self.supervisor, self.reference, self.canonical, self.stop, self._announced,
+            self.canon, self.r, self._foreseen, self._dt, lead_ns=self._lead_ns).time_s
+
+    def in_force(self) -> Running:
+        """What runs, in the gait in force or in the change between two when a request acts."""
+        gait = next_gait(self.reference, self.canonical, self._announced, self.canon, self.r,
+                         self._foreseen, self._dt, self.now_ns)
+        return self._described_in(gait)
 
     def take_over(self) -> float:
         """Let another one watch the stop from now on, who knows what acts and no votes; returns
         the time to rest that it predicts [s].
         """
         self.stop = adopted(self.inhibition, self.now_ns, self.supervisor.parameters)
+        self._announced = Announced(self.inhibition)
         self.votes = self.voting.initial_state(self.network)
         return look_ahead(
             self.supervisor, self.reference, self.canonical, self.stop,
@@ -111,7 +153,8 @@ class Oscillators(WalkingLoop):
     def advance(self) -> None:
         """Run one tick of what the certificate speaks of."""
         self.now_ns += self.tick_ns
-        dt, inhibition = self._dt, self.inhibition
+        self._announced = self._announced.at(self.now_ns)
+        dt, inhibition = self._dt, self._announced.acting
         command = self.gate.at(self.now_ns)
         self.r = self.reference.towards(self.r, command, inhibition, dt)
         if self._weaken == 'places':
@@ -126,11 +169,12 @@ class Oscillators(WalkingLoop):
             margins=self._margins if self.now_ns <= self._pushed_until_ns else None,
             wanted=canon.wanted)
         self.inhibition = self.supervisor.inhibition(self.stop)
+        self._announced = self._announced.after(self.stop, self.inhibition, self._lead_ns)
 
     @property
     def held(self) -> bool:
         """Whether a stop is in force and inhibition acts."""
-        now = self.inhibition
+        now = self.acting
         return bool(now.requested and self.network.acting_gains(now, self.x).any())
 
 

@@ -34,11 +34,14 @@ CADENCE = case({'cadence_scale': 0.25, 'alpha_r': 20.0, 'max_speed': 1.0},
                (0.1, 'start', None), (3.0, 'set', {'cadence_scale': 2.0}), (0.1, 'stop', None))
 AT_REST = case({'coupling_gain': 25.0}, (1.0, 'set', {'inhibited_legs': ('rr',)}),
                (3.0, 'start', None))
-BROKEN = {'places': WITHIN_A_START, 'arming': LOWERED_LIMIT, 'acting': CADENCE, 'holding': AT_REST}
+AHEAD = case({'alpha_r': 20.0}, (0.0, 'command', [1.5, 0.0, 0.0]), (3.0, 'start', None),
+             (2.208, 'stop', None)) | {'gait': 'pace', 'lead_s': 0.2}
+BROKEN = {'places': WITHIN_A_START, 'arming': LOWERED_LIMIT, 'acting': CADENCE, 'holding': AT_REST,
+          'leads': AHEAD, 'way': AHEAD}
 
 
 @pytest.mark.parametrize('change', [
-    ('gait', 'bound'), ('set', {'cadence_scale': 2.0}), ('set', {'radius': 2.0}),
+    ('gait', 'bound'), ('set', {'cadence_scale': 2.0}), ('set', {'rho': 12.0}),
     ('set', {'region_radius': 0.1})], ids=str)
 @pytest.mark.parametrize('wait_s', [0.3, 3.0])
 @pytest.mark.parametrize('held_by', ['votes', 'service'])
