@@ -29,7 +29,7 @@ from dmp_cpg_ros.nodes.framework.middleware import (
     start_ros,
     without_ros_arguments,
 )
-from dmp_cpg_ros.nodes.framework.strangers import Strangers
+from dmp_cpg_ros.nodes.framework.strangers import ANYBODYS, Strangers
 from dmp_cpg_ros.nodes.messages.commands import twist
 from dmp_cpg_ros.nodes.messages.interfaces import (
     STAMPED_CMD_VEL,
@@ -127,8 +127,7 @@ class SuiteClient:
         if not self.spin_until(lambda: any(future.done() for future in futures), within_s):
             raise ClientError(f'{name} did not answer within {ANSWER_WITHIN_S:g} s')
         if who := self._strangers.serving(name):
-            print(f'warning: {name} is not only of the suite{who}: whoever is faster answers',
-                  file=sys.stderr)
+            print(f'warning: {ANYBODYS.format(name, who)}', file=sys.stderr)
         return next(future for future in futures if future.done()).result()
 
     def publisher(self, topic: Interface) -> Publisher:

@@ -30,6 +30,7 @@ from dmp_cpg_ros.core.suite_parameters import CHANGEABLE
 from dmp_cpg_ros.nodes.framework.acknowledged_topic import AcknowledgedTopic
 from dmp_cpg_ros.nodes.framework.own_messages import OwnMessages
 from dmp_cpg_ros.nodes.framework.requests import ParameterSetter, ask
+from dmp_cpg_ros.nodes.framework.strangers import ANYBODYS, Strangers
 from dmp_cpg_ros.nodes.messages.commands import push_force, twist
 from dmp_cpg_ros.nodes.messages.inhibition import read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, STAMPED_CMD_VEL, interface
@@ -103,6 +104,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self.time_ns, self.mode, self.drive, self.finished = 0, '', DRIVE_MODES[0], Future()
         self._until_ns, self._again_ns, self.refused = -1, 0, 0
         self._lain: Future | None = None
+        self._strangers = Strangers(self)
         self.heard = OwnMessages(self, self._warn, lock_step=lock_step)
         voting = any(action.kind == 'votes' and action.value for action in self._actions)
         self._velocity = STAMPED_CMD_VEL if stamped else interface('cmd_vel')
@@ -282,6 +284,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         due_ns = self._actions[self._next - 1].time_ns
 
         def answered(agreed: bool, message: str) -> None:
+            self._warn_of_servers(service)
             if agreed:
                 self._say(self.time_ns * 1e-9, f'  {service}: {message}')
             elif not self._lock_step and self.time_ns < due_ns + REPEATED_NS:
@@ -292,6 +295,11 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             self._go_on(agreed, f'service {service}: {message}')
 
         ask(self._callees[service], request, self._this_time(answered))
+
+    def _warn_of_servers(self, service: str) -> None:
+        """Tell who else serves a service that has answered."""
+        if self.count_services(service) > 1 and (who := self._strangers.serving(service)):
+            self._warn(ANYBODYS.format(service, who))
 
     def _go_on(self, agreed: bool, why_not: str) -> None:
         """Go on when a service has agreed, or end the run."""
@@ -359,6 +367,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._deadline_ns = self.time_ns + PATIENCE_NS
 
         def answered(agreed: bool, message: str) -> None:
+            self._warn_of_servers('lie_down')
             if agreed:
                 self._say(self.time_ns * 1e-9, f'  lie_down: {message}')
             else:

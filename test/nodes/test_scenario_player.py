@@ -93,6 +93,26 @@ def test_what_is_refused_for_good_ends_the_run_with_the_reason(
     assert REPEATED_NS <= asked[-1] - asked[0] < REPEATED_NS + 2 * REPEAT_NS
 
 
+def test_who_else_serves_what_has_answered_is_named(
+        context: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    def warnings() -> list[str]:
+        said: list[str] = []
+        asked_at(monkeypatch, 0, said)[0].destroy_node()
+        return [text for text in said if 'served by' in text]
+
+    nodes = [Node(name, use_global_arguments=False) for name in (INHIBITION, 'stranger')]
+    service = interface('inhibit')
+    nodes[0].create_service(service.type, service.name, lambda _, response: response)
+    wait_until(lambda: nodes[0].count_services(service.name) == 1)
+    assert not warnings()
+    nodes[1].create_service(service.type, service.name, lambda _, response: response)
+    wait_until(lambda: nodes[0].count_services(service.name) == 2)
+    assert warnings() == [
+        'inhibit is not only of the suite; served by /stranger: whoever is faster answers']
+    for node in nodes:
+        node.destroy_node()
+
+
 @pytest.mark.parametrize('lock_step', [False, True])
 def test_the_ends_of_commands_and_votes_are_told(context: None, lock_step: bool) -> None:
     said: list[str] = []

@@ -36,6 +36,10 @@ def full_name(name: str, space: str) -> str:
     return f'{space.rstrip("/")}/{name}'
 
 
+ANYBODYS = '{} is not only of the suite{}: whoever is faster answers'
+"""What is said to who asks a service that :meth:`Strangers.serving` tells of."""
+
+
 class Strangers:
     """Names of nodes that are not the suite's, looked up in the graph of one of its nodes.
 
