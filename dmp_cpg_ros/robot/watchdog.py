@@ -234,8 +234,7 @@ class CommandWatchdog:
             position += 1e-9 * np.clip(late, 0, CARRIED_NS) * velocity
         if self._lagged_ns >= now - (IN_TIME_NS if self._late_ns else 0):
             return JointTargets(*self._going_on(now, np.array((position, velocity, effort))))
-        if (self._return_ns and 0 < self._late_ns < now - self._timeout_ns
-                and self._elsewhere(now, position, velocity)):
+        if self._late_ns and self._elsewhere(now, position, velocity):
             if now - self._late_ns > self._timeout_ns + self._return_ns:
                 return self._falling_back(state)
             return JointTargets(*self._going_on(now, np.array((position, velocity, effort))))

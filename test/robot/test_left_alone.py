@@ -31,6 +31,11 @@ TIMEOUT_NS = 200_000_000
 RETURN_NS = round(1e9 * RETURN_S)
 
 
+def tilt_of(state: RobotState) -> float:
+    x, y = state.base_quaternion[:2]
+    return float(np.arccos(1.0 - 2.0 * (x * x + y * y)))
+
+
 class Walk:
     """A walk in the plain loop whose targets pass the watchdog."""
 
@@ -52,6 +57,7 @@ class Walk:
         for _ in range(ticks):
             tick = self.loop.tick(self.state)
             self.phase = scalar_phase(*tick.x[0])
+            self.targets = tick.targets
             for leg, targets in tick.targets.by_leg().items():
                 if leg not in silent:
                     self.guard.accept(leg, self.state.time_ns, targets)
@@ -67,8 +73,7 @@ class Walk:
         tilt, stood = 0.0, 0
         for _ in range(ticks):
             state = robot.step(guard.targets(state))
-            x, y = state.base_quaternion[:2]
-            tilt = max(tilt, float(np.arccos(1.0 - 2.0 * (x * x + y * y))))
+            tilt = max(tilt, tilt_of(state))
             still = np.linalg.norm(state.base_velocity_in_base) < 0.05
             stood = stood + 1 if still and guard.fallback == 'stand' else 0
             if stood == STOOD:
@@ -137,6 +142,24 @@ def test_legs_that_come_back_elsewhere_in_the_gait_are_not_followed() -> None:
         walk.state = walk.robot.step(walk.guard.targets(walk.state))
     assert walk.guard.fallback == 'stand'
     assert walk.left_alone(600) < 0.3
+
+
+@pytest.mark.parametrize(('gait', 'speed', 'away'), [
+    (gait, speed, away) for gait, speed in (('amble', 0.5), ('trot', 1.0))
+    for away in (15, 30, 45)])
+def test_legs_that_were_late_for_a_moment_and_are_elsewhere_then_are_not_followed(
+        gait: str, speed: float, away: int) -> None:
+    """Feet that stand would be told to swing, as fast as a foot does that nothing holds."""
+    walk = Walk(gait, speed).go(750)
+    ahead = deepcopy(walk, {id(walk.robot.model): walk.robot.model}).go(away)
+    for tick in range(200):
+        ahead.go(1)
+        for leg, targets in ahead.targets.by_leg().items():
+            if tick >= 10:
+                walk.guard.accept(leg, walk.state.time_ns, targets)
+        walk.state = walk.robot.step(walk.guard.targets(walk.state))
+        assert tilt_of(walk.state) < 0.3
+    assert walk.guard.fallback == 'stand' and not walk.robot.fallen
 
 
 def test_it_follows_the_legs_again_once_they_are_at_rest() -> None:
