@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import signal
 import time
+import tracemalloc
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -416,6 +417,34 @@ def test_a_file_cut_anywhere_keeps_its_closed_chunks(tmp_path: Path, kept: float
     saved = [data for _, data in read(tmp_path / 'bag')['/joint_states']]
     assert saved[:expected] == [serialize_message(joint_state(k)) for k in range(expected)]
     assert expected <= len(saved) <= expected + 10
+
+
+def test_the_index_of_a_long_recording_is_whole_and_not_in_memory(tmp_path: Path) -> None:
+    chunks = 3000
+    topic, bag = interface('joint_states'), BagWriter(tmp_path / 'bag')
+    write = bag.add_topic('/joint_states', topic.type_name, topic.publisher_qos, stamped=True,
+                          clock=True)
+    messages = [serialize_message(joint_state(k)) for k in range(chunks)]
+
+    def record(begin: int, end: int) -> int:
+        for data in messages[begin:end]:
+            write(data)
+            bag.flush()
+        return tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        before = record(0, chunks // 2)
+        assert record(chunks // 2, chunks) - before < 20 * chunks
+    finally:
+        tracemalloc.stop()
+    bag.close()
+    assert not [path for path in (tmp_path / 'bag').iterdir()
+                if path.name not in ('bag.mcap', 'metadata.yaml')]
+    with open(tmp_path / 'bag' / 'bag.mcap', 'rb') as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None and len(summary.chunk_indexes) == chunks
+    assert [data for _, data in read(tmp_path / 'bag')['/joint_states']] == messages
 
 
 def test_what_cannot_be_read_or_made_is_named(tmp_path: Path) -> None:

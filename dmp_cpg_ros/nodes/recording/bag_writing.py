@@ -24,9 +24,11 @@ from __future__ import annotations
 
 import fcntl
 import struct
+import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from heapq import heappop, heappush
+from io import BytesIO
 from itertools import count
 from operator import itemgetter
 from pathlib import Path
@@ -42,6 +44,7 @@ from dmp_cpg_ros.files import first_free
 STORAGES = ('mcap', 'sqlite3')
 
 _STAMP_LITTLE, _STAMP_BIG = struct.Struct('<iI'), struct.Struct('>iI')
+_LENGTH = struct.Struct('<I')
 _STAMP_AT = 4
 """A stamp that begins a message lies behind the four bytes that say how it is encoded."""
 
@@ -59,6 +62,42 @@ _UNSET = bags.QosTime(9223372036, 854775807)
 
 class RecordingError(DmpCpgError):
     """The recording cannot go on, for example because the disk is full."""
+
+
+class ChunkIndex:
+    """Entries of the index of an MCAP file, one for each chunk, which the end of the file repeats:
+    on disk until then, in a file without a name, so that the memory of a recorder does not grow.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the recording, on whose disk it lies.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Begin without any."""
+        self._file, self._count = tempfile.TemporaryFile(dir=folder), 0
+
+    def append(self, entry: BytesIO) -> None:
+        """Add an entry; raises OSError when the disk is full."""
+        self._file.write(_LENGTH.pack(entry.getbuffer().nbytes))
+        self._file.write(entry.getbuffer())
+        self._count += 1
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __iter__(self) -> Iterator[BytesIO]:
+        self._file.seek(0)
+        for _ in range(self._count):
+            (length,) = _LENGTH.unpack(self._file.read(_LENGTH.size))
+            entry = BytesIO()
+            entry.write(self._file.read(length))  # and stands at its end, as what was added
+            yield entry
+
+    def close(self) -> None:
+        """Forget all."""
+        self._file.close()
 
 
 class BagWriter:
@@ -108,7 +147,9 @@ class BagWriter:
             raise ParameterError(
                 f"output '{folder}' must be a folder that can be made: {error}") from error
         self._file = getattr(self._writer.storage, 'bio', None)
+        self._index = ChunkIndex(self.folder)
         if self._file is not None:
+            self._writer.storage.chunks = self._index
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
     def add_topic(self, topic: str, type_name: str, qos: QoSProfile, *, stamped: bool,
@@ -175,6 +216,7 @@ class BagWriter:
             if not any(self._writer.counts.values()):
                 self._writer.min_timestamp = 0
             self._writer.close()
+            self._index.close()
         except OSError as error:
             raise RecordingError(f"cannot complete '{self.folder}': {error}") from error
 
