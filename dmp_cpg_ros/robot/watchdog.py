@@ -68,8 +68,14 @@ had not been away were so by 0.10 rad and 0.43 rad at most, a robot's stance by 
 STEPPED = 0.7
 """That distance for a robot that stands: its legs may rest on footholds a step away [rad]."""
 
-AT_EASE_NS = 100_000_000
-"""Time for which targets must have been at rest until they are followed again [ns]."""
+AT_EASE_NS, MOST_AT_EASE_NS = 100_000_000, 400_000_000
+"""Time for which targets must have been at rest and in time until they are followed again [ns];
+twice as long each time that the robot has to look after itself again soon, and how long at most: a
+robot that starts to walk has no rhythm yet with which to go on when they are late once more.
+"""
+
+AGAIN_NS = 10_000_000_000
+"""Time since it looked after itself from which on it is as for the first time [ns]."""
 
 TAKEN_UP_S = 0.3
 """Time in which the joints go over to targets that are followed again, as long for each ``NEAR``
@@ -144,6 +150,7 @@ class CommandWatchdog:
         self._rhythm: Rhythm | None = None
         self._given, self._off = np.zeros(12), np.zeros(12)
         self._begin_ns = self._late_ns = self._uneasy_ns = self._taken_ns = 0
+        self._ease_ns, self._alone_ns = AT_EASE_NS, -AGAIN_NS
         self._taking_s, self._stop_s = TAKEN_UP_S, 0.0
         self._lagged_ns = -1
         self.lateness_ns = self.ticks = self.carried = 0
@@ -296,7 +303,7 @@ class CommandWatchdog:
         if (stopping or np.abs(velocity).max() > SLOW or self.lateness_ns > CARRIED_NS
                 or np.abs(position - self._given).max() > near):
             self._uneasy_ns = now
-        return now - self._uneasy_ns >= AT_EASE_NS
+        return now - self._uneasy_ns >= self._ease_ns
 
     def _falling_back(self, state: RobotState) -> JointTargets:
         """Targets of the fallback that the robot's state asked for when it began; a robot that
@@ -306,7 +313,11 @@ class CommandWatchdog:
         if self.fallback != 'damp' and self._sense.condition(state).tilt > self._tilt:
             self.fallback = 'damp'
         elif not self.fallback or (lame and (self.fallback, self._way) in SLOWER):
+            again = now - self._alone_ns < AGAIN_NS
+            self._ease_ns = min(2 * self._ease_ns, MOST_AT_EASE_NS) if again else AT_EASE_NS
             self._begin_falling_back(state)
+        if None not in self.stamps:
+            self._alone_ns = now
         if lame or self.silent(now):
             self._uneasy_ns = now
         if self.fallback == 'damp':

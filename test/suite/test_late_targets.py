@@ -17,7 +17,16 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.suite_parameters import RobotParameters
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
-from dmp_cpg_ros.robot.watchdog import CARRIED_NS, HELD_NS, IN_TIME_NS, LATE_NS, CommandWatchdog
+from dmp_cpg_ros.robot.watchdog import (
+    AGAIN_NS,
+    AT_EASE_NS,
+    CARRIED_NS,
+    HELD_NS,
+    IN_TIME_NS,
+    LATE_NS,
+    MOST_AT_EASE_NS,
+    CommandWatchdog,
+)
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
 pytest.importorskip('mujoco')
@@ -146,6 +155,46 @@ def test_a_robot_whose_controllers_starve_does_not_fall(
     monkeypatch.setattr(late_walks, 'STARVED_S', 9.0)  # in which it stands by itself, too
     outcome = starved(gait, speed, Stalls(150.0, 200.0), seed=1)
     assert not outcome.fell and outcome.stood
+
+
+@pytest.mark.parametrize('seed', [1, 3])
+def test_a_robot_whose_controllers_starve_again_and_again_stands_instead_of_starting(
+        seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Followed as soon each time, it started to walk into the next stalls, and fell."""
+    monkeypatch.setattr(late_walks, 'STARVED_S', 7.0)
+    monkeypatch.setattr(late_walks, 'SOUND_NS', 1_000_000_000)
+    outcome = starved('trot', 1.0, Stalls(400.0, 120.0, together=1.0, lost=0.2), seed)
+    assert not outcome.fell and outcome.stood
+
+
+def test_who_has_looked_after_itself_again_and_again_follows_later_each_time(
+        standing: PerfectTrackingRobot) -> None:
+    state, guard, now = standing.reset(), make_guard(standing.description), 0
+    resting = JointTargets(state.joint_position, np.zeros(12), np.zeros(12))
+
+    def tick(heard: bool) -> None:
+        nonlocal now
+        now += TICK_NS
+        if heard:
+            accept(guard, now, resting)
+        guard.targets(replace(state, time_ns=now))
+
+    def waits() -> int:
+        for _ in range(500):  # until it stands
+            tick(heard=False)
+        assert guard.fallback
+        begin = now
+        while guard.fallback:
+            tick(heard=True)
+        return now - begin
+
+    tick(heard=True)
+    for times in (1, 2, 4, 4):
+        assert waits() == pytest.approx(times * AT_EASE_NS, abs=2 * TICK_NS)
+    assert MOST_AT_EASE_NS == 4 * AT_EASE_NS
+    for _ in range(AGAIN_NS // TICK_NS):
+        tick(heard=True)
+    assert waits() == pytest.approx(AT_EASE_NS, abs=2 * TICK_NS)
 
 
 def test_a_robot_whose_targets_come_only_now_and_then_looks_after_itself(
