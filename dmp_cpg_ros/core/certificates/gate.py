@@ -315,8 +315,7 @@ class Change:
             return 'nothing nearer is known: the running parameters are not certified themselves'
         asked = {name: wanted for name, (_, wanted) in numbers.items()}  # refused just now
         values = nearest_values(
-            numbers, lambda between: between != asked and _holds(
-                self.present.changed({**words, **between})),
+            numbers, lambda at: at != asked and _holds(self.present.changed({**words, **at})),
             _FEWER_ROUNDS if self.present.others or self.proposed.values['voting'] else _ROUNDS)
         told = ', '.join(f'{name} = {typed(value)}' for name, value in values.items())
         return f'nearest value{"s that work" if len(values) > 1 else " that works"}: {told}'
