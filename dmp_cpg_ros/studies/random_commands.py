@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.studies import output
 from dmp_cpg_ros.studies.loop_recording import Velocity, suite_of
 from dmp_cpg_ros.studies.walking_trials import Walk
@@ -52,6 +53,9 @@ class Outcome:
         Gait; time to rest as predicted, bounded, and measured of those that came to rest [s].
     stepped : int
         Stops that the robot stepped out of, of which nothing is claimed.
+    touched : float
+        Time at whose ticks parts of the robot touched one another, as legs that kick each other
+        [s].
     """
 
     seed: int
@@ -61,6 +65,7 @@ class Outcome:
     granted: float = 0.0
     stops: list[tuple[str, float, float, float]] = field(default_factory=list)
     stepped: int = 0
+    touched: float = 0.0
 
     @property
     def late(self) -> list[tuple[str, float, float, float]]:
@@ -132,6 +137,7 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
         run.tick(run.tick_s)
         run.states.clear()
         outcome.seconds += run.tick_s
+        outcome.touched += run.tick_s * touches_itself(run.robot.model, run.robot.data)
         if not loop.inhibition.requested:
             outcome.asked += foot_speed(*asked) * run.tick_s
             outcome.granted += foot_speed(*loop.gate.at(run.state.time_ns)) * run.tick_s
@@ -147,6 +153,12 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
                 f'({v_x:.2f}, {v_y:.2f}) m/s, {gamma:.2f} rad/s')
             break
     return outcome
+
+
+def touches_itself(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
+    """Whether two moving bodies of a model touch each other."""
+    root = model.body_rootid[model.geom_bodyid[data.contact.geom]]
+    return bool((root[:, 0] == root[:, 1]).any())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -177,11 +189,13 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
         each.stepped for each in outcomes)
     asked, granted = (sum(getattr(each, name) for each in outcomes)
                       for name in ('asked', 'granted'))
-    walked = sum(outcome.seconds for outcome in outcomes)
+    walked, touched = (sum(getattr(each, name) for each in outcomes)
+                       for name in ('seconds', 'touched'))
     print('\n' + output.markdown_table(
-        ('walks', 'time s', 'fell', 'stops to rest', 'late', 'stepped out', 'granted'),
+        ('walks', 'time s', 'fell', 'stops to rest', 'late', 'stepped out', 'granted',
+         'touched itself'),
         [(str(len(outcomes)), f'{walked:.0f}', str(fallen), str(stops), str(late), str(stepped),
-          output.percent(granted, asked))]))
+          output.percent(granted, asked), f'{100.0 * touched / walked:.1f} %')]))
     output.write_results(options.json, [vars(outcome) for outcome in outcomes])
     return int(fallen > 0 or late > 0)
 
