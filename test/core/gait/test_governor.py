@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from math import cos, hypot, inf, sin
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
@@ -18,7 +19,7 @@ from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters, 
 from dmp_cpg_ros.core.reference.governor import LEAST, Governor
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.model_reader import load_description
-from dmp_cpg_ros.studies.random_commands import GAITS, course, trial
+from dmp_cpg_ros.studies.random_commands import GAITS, course, touches_itself, trial
 from dmp_cpg_ros.studies.walking_trials import Walk, attitude, steady
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
@@ -131,6 +132,24 @@ def test_a_robot_stays_up_under_random_commands_under_which_it_fell() -> None:
     outcome = trial(5, 9.0)
     assert outcome.fell == '' and not outcome.late
     assert 0.3 < outcome.granted / outcome.asked <= 1.0
+
+
+@pytest.mark.parametrize(('apart', 'touches'), [(0.3, False), (0.15, True)])
+def test_legs_that_kick_each_other_are_told_from_feet_on_the_ground(
+        apart: float, touches: bool) -> None:
+    leg = ('<body pos="{0} 0 0"><joint axis="0 1 0"/><geom type="sphere" size="0.1" mass="1"/>'
+           '</body>')
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 0.09"><freejoint/>'
+        f'<geom size="0.01" pos="0 0 0.5" mass="1"/>{leg.format(0)}{leg.format(apart)}'
+        '</body></worldbody></mujoco>')
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.ncon >= 2
+    assert touches_itself(model, data) == touches
+    data.qpos[2] = 1.0
+    mujoco.mj_forward(model, data)
+    assert touches_itself(model, data) == touches
 
 
 def test_a_pace_backwards_through_a_curve_stays_up() -> None:
