@@ -155,7 +155,8 @@ class InhibitionNode(SuiteNode):
             before.state in ('walking', 'free'), self._inbox.take(self._votes.memory.asks))
         self._state = self._supervisor.step(
             before, stamp_ns, network, self._x, self._x_dot, self._r, self._gate.at(stamp_ns),
-            self._votes.tally, self._barring, margins, progress, self.certified.wanted)
+            self._votes.tally, self._barring, margins, progress, self.certified.wanted,
+            self._lead_ns == 0 or self._announced.stops)
         self._announce()
         # it goes with a clock that is set back
         self._promises.due_ns += min(0, stamp_ns - before.time_ns)

@@ -167,7 +167,7 @@ class Oscillators(WalkingLoop):
             self.stop, self.now_ns, self.network, canon.x, canon.x_dot, self.r, command,
             self.votes.tally,
             margins=self._margins if self.now_ns <= self._pushed_until_ns else None,
-            wanted=canon.wanted)
+            wanted=canon.wanted, acts=self._lead_ns == 0 or self._announced.stops)
         self.inhibition = self.supervisor.inhibition(self.stop)
         self._announced = self._announced.after(self.stop, self.inhibition, self._lead_ns)
 

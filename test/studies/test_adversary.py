@@ -40,6 +40,17 @@ BROKEN = {'places': WITHIN_A_START, 'arming': LOWERED_LIMIT, 'acting': CADENCE, 
           'leads': AHEAD, 'way': AHEAD}
 
 
+def test_legs_that_are_caught_when_a_stop_acts_later_are_not_let_go_again() -> None:
+    """Armed before it acted, inhibition was disarmed by a command that still sped the gait up."""
+    again = case({'capture_speed': 0.35058810846950283, 'braking': 0.7106366915303948,
+                  'coupling_graph': 'directed_ring', 'inhibited_legs': ('auto',)},
+                 (0.0, 'command', [1.65, 0.0, 0.0]), (0.1, 'stop', None), (0.02, 'start', None),
+                 (0.024, 'command', [2.47, 0.0, -0.37]), (0.068, 'stop', None),
+                 (0.44, 'start', None), (0.084, 'stop', None))
+    del again['parameters']['auto_inhibit']
+    assert play(ROBOT, again | {'gait': 'walk', 'lead_s': 0.021173596})[0] == ''
+
+
 @pytest.mark.parametrize('change', [
     ('gait', 'bound'), ('set', {'cadence_scale': 2.0}), ('set', {'rho': 12.0}),
     ('set', {'region_radius': 0.1})], ids=str)

@@ -40,6 +40,11 @@ class Announced(NamedTuple):
         """Stamp of the tick from which it acts [ns]; 0 where it does."""
         return self.coming[-1][0] if self.coming else 0
 
+    @property
+    def stops(self) -> bool:
+        """Whether the stop that was told last acts: the reference follows no command any more."""
+        return self.acting.requested and all(each.requested for _, each in self.coming)
+
     def at(self, stamp_ns: int) -> Announced:
         """The same at a tick [ns]."""
         due = sum(from_ns <= stamp_ns for from_ns, _ in self.coming)

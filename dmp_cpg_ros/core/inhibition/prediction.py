@@ -162,7 +162,8 @@ def ticks_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonica
         r = reference.towards(r, command, published.acting, dt)
         canon = canonical.step(canon, r, published.acting, dt)
         state = supervisor.step(state, stamp_ns, canonical.network(canon.gait), canon.x,
-                                canon.x_dot, r, command, body_mode=body_mode)
+                                canon.x_dot, r, command, body_mode=body_mode,
+                                acts=lead_ns == 0 or published.stops)
         published = published.after(state, supervisor.inhibition(state), lead_ns)
         yield state, published.latest, canon, r
 

@@ -141,8 +141,8 @@ class GaitSupervisor:
     def step(self, state: SupervisorState, time_ns: int, network: GaitNetwork, x: Array,
              x_dot: Array, r: Array, command: tuple[float, float, float],
              tally: Tally | None = None, body_mode: str = 'standing',
-             margins: Sequence[float] | None = None,
-             progress: Progress | None = None, wanted: Gait | None = None) -> SupervisorState:
+             margins: Sequence[float] | None = None, progress: Progress | None = None,
+             wanted: Gait | None = None, acts: bool = True) -> SupervisorState:
         """Advance by one tick.
 
         Parameters
@@ -167,6 +167,8 @@ class GaitSupervisor:
             Of the body, where it is known.
         wanted : Gait, optional
             Gait that was asked for, into which the one that acts changes at a lower speed.
+        acts : bool
+            Whether a stop that is requested acts: before inhibition is not armed.
         """
         dt = time_step(state.time_ns, time_ns)
         if time_ns < state.time_ns:
@@ -187,8 +189,8 @@ class GaitSupervisor:
         most = 1.0 if wanted is None else changing_share(network, wanted, command)
         quick = state.quickness > 1.0
         state = self._balancing(state, margins, network, progress or Progress(), most, dt)
-        if state.requested:
-            return (replace_unchecked(state, armed=False, state='waiting') if quick
+        if state.requested:  # until it acts the reference may speed up
+            return (replace_unchecked(state, armed=False, state='waiting') if quick or not acts
                     else self._stopping(state, network, x, rates, speed))
         return self._running(state, network.phase_errors(x), speed)
 
