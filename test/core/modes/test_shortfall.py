@@ -36,14 +36,19 @@ def test_what_stays_short_is_told_once_wherever_it_goes(direction: float) -> Non
     assert LASTS_S <= at <= LASTS_S + MEAN_S
 
 
-@pytest.mark.parametrize('motion', [
-    lambda t: (1.0, 0.93), lambda t: (1.0, 1.4),                     # near enough, or faster
-    lambda t: (1.0, 0.97 + 0.9 * sin(12.0 * t)),                     # what a gait swings by
-    lambda t: (min(1.5, t), min(1.5, max(0.0, t - 0.25))),           # sets off a little late
-    lambda t: (0.9 + 0.6 * sin(t), 0.9 + 0.6 * sin(t - 0.2)),        # follows a swing late
-    lambda t: (0.1, 0.0),                                            # hardly asked to walk
-    lambda t: (0.0, 0.0), lambda t: (0.0 if t % 3.0 > 2.0 else 1.0, 0.5),
-], ids=str)
+WALKS: dict[str, Motion] = {
+    'near enough': lambda t: (1.0, 0.93),
+    'faster': lambda t: (1.0, 1.4),
+    'swings with the gait': lambda t: (1.0, 0.97 + 0.9 * sin(12.0 * t)),
+    'sets off late': lambda t: (min(1.5, t), min(1.5, max(0.0, t - 0.25))),
+    'follows late': lambda t: (0.9 + 0.6 * sin(t), 0.9 + 0.6 * sin(t - 0.2)),
+    'hardly asked': lambda t: (0.1, 0.0),
+    'rests': lambda t: (0.0, 0.0),
+    'stops between': lambda t: (0.0 if t % 3.0 > 2.0 else 1.0, 0.5),
+}
+
+
+@pytest.mark.parametrize('motion', WALKS.values(), ids=WALKS)
 def test_what_a_walk_does_is_not_told(motion: Motion) -> None:
     assert not told(motion)
 
