@@ -94,7 +94,8 @@ def run(name: str) -> int:
             module = import_module(_module(name))
             if _folder(name) == 'nodes':
                 module = import_module(f'{PACKAGE}.nodes.framework.execution')
-        return int(module.run_node(name) if _folder(name) == 'nodes' else module.main())
+        return _to_the_end(module.run_node, name) if _folder(name) == 'nodes' else (
+            _to_the_end(module.main))
     except KeyboardInterrupt:
         return INTERRUPTED
     except ImportError as error:
@@ -134,6 +135,20 @@ def _of_distribution() -> bool:
 
     return sys.prefix == sys.base_prefix and os.path.isfile(
         os.path.join(sysconfig.get_path('stdlib'), 'EXTERNALLY-MANAGED'))
+
+
+def _to_the_end(body: Callable[..., int], *arguments: str) -> int:
+    """Exit status of a body, which a Ctrl-C that comes after it does not change: Python gives
+    signals back to Linux before it has ended, and Linux would end the process by this one.
+    """
+    try:
+        try:
+            return int(body(*arguments))
+        finally:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+    except KeyboardInterrupt:  # in the body, or just after it
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        return INTERRUPTED
 
 
 @contextmanager
