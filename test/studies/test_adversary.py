@@ -51,6 +51,14 @@ def test_legs_that_are_caught_when_a_stop_acts_later_are_not_let_go_again() -> N
     assert play(ROBOT, again | {'gait': 'walk', 'lead_s': 0.021173596})[0] == ''
 
 
+def test_a_start_that_is_taken_back_before_it_acts_lets_no_leg_go() -> None:
+    """Start and stop in one tick, while legs are held: they were free for a tick, a lead later."""
+    again = case({'inhibited_legs': ('fl', 'rl', 'fr', 'rr')}, (2.0, 'start', None),
+                 (0.0, 'stop', None), (0.2862832348595192, 'start', None))
+    del again['parameters']['auto_inhibit']
+    assert play(ROBOT, again | {'gait': 'bound', 'lead_s': 0.024})[0] == ''
+
+
 @pytest.mark.parametrize('change', [
     ('gait', 'bound'), ('set', {'cadence_scale': 2.0}), ('set', {'rho': 12.0}),
     ('set', {'region_radius': 0.1})], ids=str)

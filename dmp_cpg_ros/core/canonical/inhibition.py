@@ -124,10 +124,14 @@ class Inhibition:
         change all the time, are left aside.
         """
         return self is not other and (
-            (self.requested, self.at_rest, self.automatic, self.opposite, self.region_radius,
-             self.rest_phase, self.gains.tobytes())
-            != (other.requested, other.at_rest, other.automatic, other.opposite,
-                other.region_radius, other.rest_phase, other.gains.tobytes()))
+            (self.requested, self.at_rest, self.automatic, self.opposite)
+            != (other.requested, other.at_rest, other.automatic, other.opposite)
+            or not self.holds_as(other))
+
+    def holds_as(self, other: Inhibition) -> bool:
+        """Whether another one holds the same legs in the same places."""
+        return ((self.region_radius, self.rest_phase, self.gains.tobytes())
+                == (other.region_radius, other.rest_phase, other.gains.tobytes()))
 
     def acting_gains(self, x: Array, target: Array) -> Array:
         """Gains that act at a state: α_i inside C_i and zero outside.

@@ -57,11 +57,16 @@ class Announced(NamedTuple):
 
     def after(self, state: SupervisorState, inhibition: Inhibition, lead_ns: int) -> Announced:
         """With what whoever watches the stop tells at a state of his; what stops or runs the gait
-        in another way does so a lead later, unless a push asks for it.
+        in another way does so a lead later, unless a push asks for it. What holds the legs as the
+        stop that acts does takes the place of all that was to act between: a start that was taken
+        back lets no leg go.
         """
         from_ns = self.latest_ns
         if state.push.acts:
             from_ns = 0
+        elif self.coming and self.stops and inhibition.requested and inhibition.holds_as(
+                self.acting):
+            from_ns = self.coming[0][0]
         elif lead_ns and inhibition.differs(self.latest):
             from_ns = state.time_ns + lead_ns
         return self.told(max(from_ns, state.time_ns), inhibition)
