@@ -168,7 +168,7 @@ class GaitSupervisor:
         wanted : Gait, optional
             Gait that was asked for, into which the one that acts changes at a lower speed.
         acts : bool
-            Whether a stop that is requested acts: before inhibition is not armed.
+            Whether a stop that is requested acts; inhibition is not armed before it does.
         """
         dt = time_step(state.time_ns, time_ns)
         if time_ns < state.time_ns:
