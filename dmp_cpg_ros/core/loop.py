@@ -133,7 +133,8 @@ class WalkingLoop:
 
     def _take(self, p: SuiteParameters, wanted: Gait) -> None:
         """Make the parts anew that may get other parameters and hold nothing else."""
-        gaits = limiting_gaits(p.gait_choice, wanted.name, self._reader.named)
+        gaits = limiting_gaits(p.gait_choice, wanted.name, self._reader.named,
+                               p.canonical.cadence_scale)
         self.gate.follow(p.reference, gaits)
         self.parameters = p
         self.reference = ReferenceSystem(

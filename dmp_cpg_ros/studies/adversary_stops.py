@@ -161,7 +161,7 @@ def draw_radius(rng: np.random.Generator, weaken: bool) -> Case:
     """A coupling that is weak beside inhibition and cadence."""
     return suite_case(rng, {
         'coupling_gain': log_uniform(rng, 4.0, 60.0), 'rho': log_uniform(rng, 0.3, 8.0),
-        'cadence_scale': log_uniform(rng, 0.5, 4.0), 'inhibition_gain': 4000.0,
+        'cadence_scale': log_uniform(rng, 0.7, 4.0), 'inhibition_gain': 4000.0,
         'coupling_graph': str(rng.choice(['star', 'path', 'ring'])),
         'inhibited_legs': (str(rng.choice(LEGS)),), 'max_speed': 0.2,
         'region_radius': float(rng.uniform(0.3, 1.2))})

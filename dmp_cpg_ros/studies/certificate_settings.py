@@ -71,10 +71,10 @@ def grid_case(graph: str, gait: str, gain: float, share: float, region: float, l
     radius = float(rng.uniform(0.5, 2.0))
     canonical = CanonicalParameters(
         rho=rho / radius**2, radius=radius, coupling_gain=gain,
-        coupling_graph='ring' if graph == 'directed' else graph,
-        cadence_scale=float(rng.uniform(0.6, 1.6)))
+        coupling_graph='ring' if graph == 'directed' else graph)
+    paced = GAITS[gait].scaled(float(rng.uniform(0.6, 1.6)))
     reference = ReferenceParameters(max_speed=float(rng.uniform(0.2, 1.5)))
-    network = GaitNetwork(canonical, GAITS[gait], SCALE)
+    network = GaitNetwork(canonical, paced, SCALE)
     if graph == 'directed':
         rng.random(len(LEGS))                        # once phases; what is drawn next stays so
         _couple(network, graph_from_edges(len(LEGS), random_edges(len(LEGS), rng), gain,
@@ -106,9 +106,9 @@ def random_setting(rng: np.random.Generator) -> Setting:
     gain, graph = growth * some(1.5, 60.0), str(rng.choice([*GRAPHS, 'directed', 'cascade']))
     canonical = CanonicalParameters(
         rho=growth / radius**2, radius=radius, coupling_gain=gain,
-        coupling_graph='ring' if graph in ('directed', 'cascade') else graph,
-        cadence_scale=some(0.25, 3.0))
-    network = GaitNetwork(canonical, GAITS[str(rng.choice(list(GAITS)))], SCALE)
+        coupling_graph='ring' if graph in ('directed', 'cascade') else graph)
+    paced = some(0.25, 3.0)
+    network = GaitNetwork(canonical, GAITS[str(rng.choice(list(GAITS)))].scaled(paced), SCALE)
     edges: Edges = {'directed': random_edges(len(LEGS), rng),
                     'cascade': ((0, 1), (1, 0), (2, int(rng.integers(2))), (2, 3), (3, 2))}.get(
                         graph) or topology(graph, len(LEGS))

@@ -1,10 +1,13 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """Walks under random commands: velocities that jump every 0.5 to 3 s over all that may be asked,
-gaits that change every 2 to 8 s, stops every 4 to 14 s that are held for 0.2 to 4.5 s.
+gaits that change every 2 to 8 s, stops every 4 to 14 s that are held for 0.2 to 4.5 s. With
+``--changes`` also one of the parameters that may change while they run every 0.3 to 3 s, anywhere
+in its range or in what certificates can be had for, and lying down or standing up every 5 to 20 s.
 
 Prints the falls with what was asked when, the stops that took longer than their bound or another
-time than predicted, and the share of what was asked that was granted. The MuJoCo robot in the
+time than predicted, and the share of what was asked that was granted. Of stops in which parameters
+changed or the robot was to lie down too nothing was predicted. The MuJoCo robot in the
 plain loop, with the state estimated from noisy sensors. Equal seeds give equal walks.
 """
 
@@ -13,6 +16,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
@@ -21,6 +25,9 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.core.canonical.coupling import TOPOLOGIES
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.studies import output
 from dmp_cpg_ros.studies.loop_recording import Velocity, suite_of
@@ -31,7 +38,28 @@ from dmp_cpg_ros.suite import load_gaits
 JUMPS, CHANGES, STOPS, HOLDS = (0.5, 3.0), (2.0, 8.0), (4.0, 14.0), (0.2, 4.5)
 """Times between jumps of the command, changes of the gait and stops, and of holding one [s]."""
 
+SETTINGS, MODES = (0.3, 3.0), (5.0, 20.0)
+"""Times between changes of a parameter, and between requests to lie down or stand up [s]."""
+
 GAITS = ('amble', 'walk', 'trot', 'pace', 'bound', 'pronk')
+
+NUMBERS = {
+    'rho': (2.0, 50.0), 'coupling_gain': (5.0, 400.0), 'cadence_scale': (0.7, 4.0),
+    'gait_change_rate': (0.01, 0.6), 'alpha_r': (0.3, 50.0), 'max_speed': (0.02, 10.0),
+    'max_lateral_speed': (0.02, 10.0), 'max_turn_rate': (0.02, 10.0), 'max_curve': (0.01, 10.0),
+    'braking': (0.5, 20.0), 'inhibition_gain': (100.0, 4000.0), 'region_radius': (0.05, 0.6),
+    'capture_speed': (0.01, 10.0), 'auto_delay': (0.05, 5.0)}
+"""Numbers that change, and between what they are drawn, evenly over their logarithms."""
+
+NEAR_THE_GROUND = ('lowering', 'lying', 'rising')
+"""Modes of a body that has not fallen and may touch the ground."""
+
+WORDS: dict[str, tuple[Any, ...]] = {
+    'coupling_graph': TOPOLOGIES, 'inhibited_legs': (('auto',), *((leg,) for leg in LEGS),
+                                                     ('fl', 'rr'), ('fr', 'rl', 'rr'), LEGS),
+    'auto_gait': (False, True), 'auto_inhibit': (False, True), 'push_recovery': (False, True),
+    'caution': (False, True)}
+"""Choices that change."""
 
 
 @dataclass
@@ -53,6 +81,8 @@ class Outcome:
         Gait; time to rest as predicted, bounded, and measured of those that came to rest [s].
     stepped : int
         Stops that the robot stepped out of, of which nothing is claimed.
+    changed, refused : int
+        Changes of parameters that were made, and those that were refused.
     touched : float
         Time at whose ticks parts of the robot touched one another, as legs that kick each other
         [s].
@@ -65,6 +95,8 @@ class Outcome:
     granted: float = 0.0
     stops: list[tuple[str, float, float, float]] = field(default_factory=list)
     stepped: int = 0
+    changed: int = 0
+    refused: int = 0
     touched: float = 0.0
 
     @property
@@ -74,12 +106,12 @@ class Outcome:
                 if stop[3] > stop[2] + 1e-9 or abs(stop[3] - stop[1]) > 1e-9]
 
 
-def course(seed: int, seconds: float, limits: Velocity, gaits: Sequence[str] = GAITS
-           ) -> list[tuple[float, str, Any]]:
-    """Events of one walk in order of time: ``command``, ``gait``, ``stop`` (whether); those of a
-    longer one begin with them.
+def course(seed: int, seconds: float, limits: Velocity, gaits: Sequence[str] = GAITS,
+           changes_too: bool = False) -> list[tuple[float, str, Any]]:
+    """Events of one walk in order of time: ``command``, ``gait``, ``stop`` (whether), and with
+    changes ``set`` (a mapping) and ``mode``; those of a longer one begin with them.
     """
-    jumps, changes, stops = np.random.default_rng(seed).spawn(3)
+    jumps, changes, stops, settings, modes = np.random.default_rng(seed).spawn(5)
 
     def times(rng: np.random.Generator, between: tuple[float, float]) -> Iterator[float]:
         at = 0.0
@@ -95,11 +127,23 @@ def course(seed: int, seconds: float, limits: Velocity, gaits: Sequence[str] = G
         if at > begin:  # not while the stop before is held
             begin = at + float(stops.uniform(*HOLDS))
             events += [(at, 'stop', True), (begin, 'stop', False)]
+    if changes_too:
+        events += [(at, 'set', setting(settings)) for at in times(settings, SETTINGS)]
+        events += [(at, 'mode', str(modes.choice(['lie_down', 'stand_up'])))
+                   for at in times(modes, MODES)]
     return sorted(events, key=lambda event: event[0])
 
 
-def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[str] = GAITS
-          ) -> Outcome:
+def setting(rng: np.random.Generator) -> dict[str, Any]:
+    """Draw a parameter and its value."""
+    name = str(rng.choice([*NUMBERS, *WORDS]))
+    if name in WORDS:
+        return {name: WORDS[name][rng.integers(len(WORDS[name]))]}
+    return {name: float(np.exp(rng.uniform(*np.log(NUMBERS[name]))))}
+
+
+def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[str] = GAITS,
+          changes: bool = False) -> Outcome:
     """Walk one course, from a gait that its seed draws.
 
     Parameters
@@ -112,13 +156,15 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
         Robot file; the suite's own without.
     gaits : sequence of str
         Gaits to change among.
+    changes : bool
+        Whether parameters change and the robot lies down and stands up meanwhile.
     """
     first = gaits[seed % len(gaits)]
     p = suite_of(robot=robot).parameters.reference
     limits = (p.max_speed, p.max_lateral_speed, p.max_turn_rate)
     run, outcome = Walk(first, robot, seed=seed + 1), Outcome(seed)
     loop, asked, open_stop = run.loop, (0.0, 0.0, 0.0), None
-    events = course(seed, seconds, limits, gaits)
+    events = course(seed, seconds, limits, gaits, changes)
     foot_speed = loop.canonical.scale.foot_speed
     for k in range(round(seconds / run.tick_s)):
         stops = False
@@ -129,9 +175,19 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
                 loop.command(*asked)
             elif what == 'gait':
                 loop.change_gait(value)
+            elif what == 'set':
+                refused = bool(loop.change(value))
+                outcome.refused, outcome.changed = (
+                    outcome.refused + refused, outcome.changed + (not refused))
+                open_stop = open_stop if refused else None
+            elif what == 'mode':
+                with suppress(DataError):  # such as to stand up while it stands
+                    loop.request_mode(value)
+                    open_stop = None
             else:
-                stops, open_stop = value, None
-                loop.request(value)
+                stops, open_stop = value and not loop.inhibition.requested, None
+                with suppress(DataError):  # a start while it does not stand
+                    loop.request(value)
         if stops:  # what comes within the tick of a request acts when it does
             open_stop = loop.canon.gait.name, loop.request(True), loop.time_to_rest()
         run.tick(run.tick_s)
@@ -146,7 +202,7 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
         if open_stop is not None and loop.stop.state == 'at_rest':
             outcome.stops.append((*open_stop, loop.stop.measured_s))
             open_stop = None
-        if run.fell():
+        if run.fell() and loop.mode.mode not in NEAR_THE_GROUND:
             v_x, v_y, gamma = asked
             outcome.fell = (
                 f'{outcome.seconds:.1f} s, {loop.canon.gait.name}, {loop.stop.state}, asked '
@@ -169,12 +225,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--robot', metavar='FILE', help="robot file (default: the suite's own)")
     parser.add_argument('--gaits', nargs='+', choices=sorted(load_gaits()), default=GAITS,
                         metavar='GAIT', help='gaits to change among (default: all six)')
+    parser.add_argument('--changes', action='store_true', help='parameters change, and the robot '
+                        'lies down and stands up, meanwhile')
     parser.add_argument('--seed', type=int, default=0, help='of the first walk (default: 0)')
     return run_command(parser, arguments, _study)
 
 
 def _study(options: argparse.Namespace, _: RosArguments) -> int:
-    walk = partial(trial, seconds=options.seconds, robot=options.robot, gaits=options.gaits)
+    walk = partial(trial, seconds=options.seconds, robot=options.robot, gaits=options.gaits,
+                   changes=options.changes)
     outcomes = []
     with Workers(options.workers, options.cluster, progress=True) as workers:
         for outcome in workers.map(walk, range(options.seed, options.seed + options.runs)):
@@ -193,9 +252,11 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
                        for name in ('seconds', 'touched'))
     print('\n' + output.markdown_table(
         ('walks', 'time s', 'fell', 'stops to rest', 'late', 'stepped out', 'granted',
-         'touched itself'),
+         'touched itself', 'changed', 'refused'),
         [(str(len(outcomes)), f'{walked:.0f}', str(fallen), str(stops), str(late), str(stepped),
-          output.percent(granted, asked), f'{100.0 * touched / walked:.1f} %')]))
+          output.percent(granted, asked), f'{100.0 * touched / walked:.1f} %',
+          str(sum(each.changed for each in outcomes)),
+          str(sum(each.refused for each in outcomes)))]))
     output.write_results(options.json, [vars(outcome) for outcome in outcomes])
     return int(fallen > 0 or late > 0)
 

@@ -169,7 +169,7 @@ def test_a_change_is_judged_by_what_the_ones_before_it_have_made(walking: Walkin
 
 def test_a_verdict_that_comes_late_is_not_applied_to_another_cadence(walking: Walking) -> None:
     """For the cadence at which it was asked the change would be accepted."""
-    slower = {'cadence_scale': 0.5, 'coupling_gain': 30.0}
+    slower = {'cadence_scale': 0.7, 'coupling_gain': 30.0}
     assert walking.change(**slower) == (True, '')
     assert walking.change(cadence_scale=1.0, coupling_gain=100.0) == (True, '')
     walking.tick(400)

@@ -48,7 +48,7 @@ def blocks(html: str) -> dict[str, bytes]:
 
 @pytest.mark.parametrize('changes', [
     {}, {'gait': 'trot'}, {'inhibition_gain': 150.0}, {'coupling_graph': 'ring', 'leg': 'rr'},
-    {'region_radius': 0.1, 'cadence_scale': 0.5}, {'leg': 'auto'}])
+    {'region_radius': 0.1, 'cadence_scale': 0.7}, {'leg': 'auto'}])
 def test_its_certificate_is_that_of_the_suite(changes: dict[str, Any]) -> None:
     set_ = {('inhibited_legs' if name == 'leg' else name): [value] if name == 'leg' else value
             for name, value in changes.items()}

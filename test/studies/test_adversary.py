@@ -30,8 +30,9 @@ WITHIN_A_START = case(
 LOWERED_LIMIT = case({}, (0.1, 'start', None), (0.0, 'command', [3.0, 0.0, 0.0]),
                      (4.0, 'set', {'max_speed': 0.05, 'max_lateral_speed': 0.0,
                                    'max_turn_rate': 0.0}), (0.004, 'stop', None))
-CADENCE = case({'cadence_scale': 0.25, 'alpha_r': 20.0, 'max_speed': 1.0},
-               (0.1, 'start', None), (3.0, 'set', {'cadence_scale': 2.0}), (0.1, 'stop', None))
+CADENCE = case(
+    {'cadence_scale': 0.7, 'alpha_r': 20.0, 'max_speed': 1.0, 'inhibition_gain': 1200.0},
+    (0.1, 'start', None), (3.0, 'set', {'cadence_scale': 4.0}), (0.1, 'stop', None))
 AT_REST = case({'coupling_gain': 25.0}, (1.0, 'set', {'inhibited_legs': ('rr',)}),
                (3.0, 'start', None))
 AHEAD = case({'alpha_r': 20.0}, (0.0, 'command', [1.5, 0.0, 0.0]), (3.0, 'start', None),

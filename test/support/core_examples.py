@@ -56,10 +56,13 @@ def standing_state(robot: RobotDescription, time_ns: int = 0, **changes: object)
     return dataclasses.replace(state, **changes)  # type: ignore[arg-type]
 
 
-def network(gait: str | Gait = 'amble', **changes: object) -> GaitNetwork:
-    """The oscillators of a gait on the example robot; changes of CanonicalParameters."""
+def network(gait: str | Gait = 'amble', paced: float = 1.0, **changes: object) -> GaitNetwork:
+    """The oscillators of a gait, with a factor on its cadences, on the example robot; changes of
+    CanonicalParameters.
+    """
+    known = GAITS[gait] if isinstance(gait, str) else gait
     return GaitNetwork(CanonicalParameters(**changes),  # type: ignore[arg-type]
-                       GAITS[gait] if isinstance(gait, str) else gait, body_scale(quadruped()))
+                       known.scaled(paced), body_scale(quadruped()))
 
 
 def suite_parameters(**changes: object) -> SuiteParameters:

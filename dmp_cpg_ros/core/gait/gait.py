@@ -14,17 +14,17 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
-from math import inf, tau
+from math import inf, nan, tau
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.phase import wrapped
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait import speed_limit
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce
 from dmp_cpg_ros.core.gait.lags import ENDS, SIDES, rest_phase, stance_groups, stand_together
-from dmp_cpg_ros.core.gait.speed_limit import fastest_swing, swing_acceleration, within_limit
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Triple
@@ -150,7 +150,7 @@ class CycleOfLegs(ABC):
         """Velocity (v_x, v_y [m/s], γ [rad/s]) within the highest speed and the largest curve, as
         a share of g, that goes with it: :mod:`~dmp_cpg_ros.core.gait.speed_limit`.
         """
-        return within_limit(velocity, self.limiting_speed(velocity, scale),
+        return speed_limit.within_limit(velocity, self.limiting_speed(velocity, scale),
                             scale.speed(self.highest(scale)), largest_curve * GRAVITY)
 
     def pace(self, r: Array, scale: BodyScale) -> Pace:
@@ -222,6 +222,7 @@ class Gait(CycleOfLegs):
     _tables: tuple[list[float], ...] = field(init=False, repr=False, compare=False)
     _nominal: list[float] = field(init=False, repr=False, compare=False)
     _highest: tuple[float, float] = field(init=False, repr=False, compare=False)
+    _strides: tuple[float, float] = field(init=False, default=(nan, nan), repr=False)
 
     def __post_init__(self) -> None:
         """Validate and find the rest phase."""
@@ -294,7 +295,7 @@ class Gait(CycleOfLegs):
         scaled, cadence = copy(self), self.cadence * cadence_scale
         vars(scaled).update(
             cadence=cadence, cadence_scale=self.cadence_scale * cadence_scale, _paced=None,
-            _tables=(self._tables[0], cadence.tolist(), self._tables[2]))
+            _strides=(nan, nan), _tables=(self._tables[0], cadence.tolist(), self._tables[2]))
         return scaled
 
     def following(self, omega: float, change_rate: float, pauses: bool, dt: float
@@ -315,15 +316,23 @@ class Gait(CycleOfLegs):
 
     def highest(self, scale: BodyScale) -> float:
         """Dimensionless foot speed that is never exceeded on a robot: the gait's, or the one for
-        which hips can swing the legs without a factor on the cadence; the last answer is kept.
+        which hips can swing the legs without a factor on the cadence, and with a slower one the
+        one with the same strides as that; the last answers are kept.
         """
+        speeds, _, duties = self._tables
         if self._highest[0] != scale.swing:
-            speeds, _, duties = self._tables
-            vars(self)['_highest'] = scale.swing, fastest_swing(
-                lambda u: swing_acceleration(u, _interpolated(u, speeds, self._nominal),
-                                             _interpolated(u, speeds, duties)),
+            vars(self)['_highest'] = scale.swing, speed_limit.fastest_swing(
+                lambda u: speed_limit.swing_acceleration(
+                    u, _interpolated(u, speeds, self._nominal), _interpolated(u, speeds, duties)),
                 scale.swing / GRAVITY, self.highest_speed)
-        return self._highest[1]
+        highest = self._highest[1]
+        if self.cadence_scale >= 1.0:
+            return highest
+        if self._strides[0] != highest:
+            vars(self)['_strides'] = highest, speed_limit.fastest_stride(
+                lambda u: u * _interpolated(u, speeds, duties) / _interpolated(
+                    u, speeds, self._nominal), self.cadence_scale, highest)
+        return self._strides[1]
 
     def bounce(self, cycle_position: float, duty: float, omega: float) -> Bounce:
         """How the body rises and falls, see :mod:`~dmp_cpg_ros.core.gait.com_height`."""

@@ -47,7 +47,9 @@ class CanonicalParameters(Parameters):
     coupling_graph: str = parameter(
         'all_to_all', 'coupling graph of the legs',
         choices=TOPOLOGIES)
-    cadence_scale: float = parameter(1.0, "factor on the gait's cadence at every speed", 0.25, 4.0)
+    cadence_scale: float = parameter(
+        1.0, "factor on the gait's cadence at every speed; slower robots tip over between steps",
+        0.7, 4.0)
     contact_feedback: bool = parameter(
         False, 'whether early and late touchdown shift the phase of the legs')
     contact_gain: float = parameter(
@@ -59,7 +61,6 @@ class CanonicalParameters(Parameters):
     margin_share: float = parameter(
         0.5, 'fraction of the margin for unequal leg frequencies that contact feedback may use',
         0.0, 0.95)
-
 
     @property
     def oscillators(self) -> Oscillators:

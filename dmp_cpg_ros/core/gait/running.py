@@ -81,8 +81,8 @@ class GaitChoiceParameters(Parameters):
             raise ParameterError('auto_speeds must increase by more than auto_hysteresis')
 
 
-def limiting_gaits(parameters: GaitChoiceParameters, name: str,
-                   named: Callable[[str], Gait]) -> tuple[Gait, ...]:
+def limiting_gaits(parameters: GaitChoiceParameters, name: str, named: Callable[[str], Gait],
+                   cadence_scale: float = 1.0) -> tuple[Gait, ...]:
     """Gaits whose limits commands are to keep.
 
     Parameters
@@ -93,6 +93,8 @@ def limiting_gaits(parameters: GaitChoiceParameters, name: str,
         Gait that is wanted where it is not chosen.
     named : callable (str) → Gait
         Gait of a name.
+    cadence_scale : float
+        Factor on the cadence that is wanted: a slower one limits commands, a quicker one does not.
 
     Returns
     -------
@@ -100,7 +102,7 @@ def limiting_gaits(parameters: GaitChoiceParameters, name: str,
         The gait, or all that may be chosen.
     """
     names = parameters.auto_gaits if parameters.auto_gait else (name,)
-    return tuple(named(each) for each in names)
+    return tuple(named(each).scaled(min(cadence_scale, 1.0)) for each in names)
 
 
 def chosen_gait(parameters: GaitChoiceParameters, present: str, r: Array, scale: BodyScale) -> str:

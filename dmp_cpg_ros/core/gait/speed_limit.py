@@ -34,6 +34,9 @@ the foot is accelerated by
 
 with τ the torque of the hip joint, I the leg's inertia about it and l the height of the hips: what
 the hip alone gives to a foot under it.
+
+A cadence that is slower than the gait's by a factor c < 1 has longer strides, u β/(c f), which
+legs reach no farther for. They stay within those of the gait at its highest speed.
 """
 
 from __future__ import annotations
@@ -142,3 +145,26 @@ def fastest_swing(needed: Callable[[float], float], available: float, highest: f
             return last_that_holds(lambda u: needed(u) <= available, last, speed, 50)
         last = speed
     return highest
+
+
+def fastest_stride(stride: Callable[[float], float], slower: float, highest: float) -> float:
+    """Speed at which a slower cadence has the strides of the highest speed.
+
+    Parameters
+    ----------
+    stride : callable (float) → float
+        Way of a standing foot at a speed at the gait's own cadence, u β/f, which grows with it.
+    slower : float
+        Factor on the cadence, in (0, 1].
+    highest : float
+        Highest speed at the gait's own cadence; infinite for none.
+
+    Returns
+    -------
+    float
+        In (0, ``highest``].
+    """
+    if highest == inf:
+        return highest
+    longest = slower * stride(highest)
+    return last_that_holds(lambda u: stride(u) <= longest, 0.0, highest, 50)

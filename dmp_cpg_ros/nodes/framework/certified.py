@@ -336,7 +336,8 @@ class Certified:
     def _limiting_gaits(self) -> tuple[Gait, ...]:
         of = self._node.parameters_of
         return limiting_gaits(
-            of(GaitChoiceParameters), of(suite.GaitParameters).gait, self.gaits.named)
+            of(GaitChoiceParameters), of(suite.GaitParameters).gait, self.gaits.named,
+            of(CanonicalParameters).cadence_scale)
 
 
 def certificate_words(certificate: Certificate) -> str:

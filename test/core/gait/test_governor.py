@@ -125,6 +125,9 @@ def test_equal_seeds_give_equal_courses_of_every_kind_of_event() -> None:
     assert events == course(3, 60.0, limits) != course(4, 60.0, limits)
     assert events[:20] == course(3, 61.0, limits)[:20]
     assert {what for _, what, _ in events} == {'command', 'gait', 'stop'}
+    more = course(3, 60.0, limits, changes_too=True)
+    assert [event for event in more if event[1] in ('command', 'gait', 'stop')] == events
+    assert {what for _, what, _ in more} == {'command', 'gait', 'stop', 'set', 'mode'}
 
 
 def test_a_robot_stays_up_under_random_commands_under_which_it_fell() -> None:
@@ -132,6 +135,11 @@ def test_a_robot_stays_up_under_random_commands_under_which_it_fell() -> None:
     outcome = trial(5, 9.0)
     assert outcome.fell == '' and not outcome.late
     assert 0.3 < outcome.granted / outcome.asked <= 1.0
+
+
+def test_a_robot_that_lies_down_and_gets_other_parameters_meanwhile_has_not_fallen() -> None:
+    outcome = trial(71004, 14.0, changes=True)
+    assert outcome.fell == '' and outcome.changed > 3 and not outcome.late
 
 
 @pytest.mark.parametrize(('apart', 'touches'), [(0.3, False), (0.15, True)])

@@ -113,11 +113,43 @@ def test_a_robot_is_never_asked_to_swing_its_legs_harder_than_its_hips_can(
     assert 0.0 < most <= of.highest_speed
     assert max(needed(u) for u in np.linspace(0.0, most, 50)) <= swing * (1.0 + 1e-9)
     assert most == of.highest_speed or needed(most * 1.001) > swing
-    assert of.scaled(factor).highest(scale) == most
+    assert of.scaled(max(factor, 1.0)).highest(scale) == most
     assert of.highest(replace(scale, swing=2.0 * swing)) >= most
     assert of.highest(replace(scale, swing=inf)) == of.highest_speed
     velocity, *_ = of.pace(np.array(FAST), scale)
     assert scale.foot_speed(*velocity) <= scale.speed(most) * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize('gait', sorted(GAITS))
+@pytest.mark.parametrize('swing', [150.0, inf])
+def test_strides_of_a_slower_cadence_are_no_longer_than_the_longest(
+        gait: str, swing: float) -> None:
+    scale, of = replace(SCALE, swing=swing), GAITS[gait]
+
+    def stride(u: float, factor: float) -> float:
+        cadence, duty = (np.interp(u, of.speed, table) for table in (of.cadence, of.duty_factor))
+        return float(u * duty / (factor * cadence))
+
+    before, longest = of.highest(scale), stride(of.highest(scale), 1.0)
+    for factor in (0.95, 0.8, 0.7, 0.5):
+        most = of.scaled(0.5).scaled(2.0 * factor).highest(scale)
+        assert most < before
+        assert stride(most, factor) == pytest.approx(longest)
+        gate = CommandGate(ReferenceParameters(max_speed=9.0, cmd_vel_timeout=0.0), scale,
+                           limiting_gaits(GaitChoiceParameters(), gait, GAITS.__getitem__, factor))
+        gate.accept(9.0, 0.0, 0.0)
+        assert gate.at(0)[0] == pytest.approx(most * ROOT)
+        before = most
+
+
+@pytest.mark.parametrize(('gait', 'velocity'), [
+    ('amble', (3.5, 0.0, 0.0)), ('trot', (-3.5, 0.0, 0.0)), ('walk', (0.0, 0.0, 2.2))])
+def test_a_robot_stays_up_at_the_slowest_cadence_whatever_it_is_told(
+        gait: str, velocity: tuple[float, float, float]) -> None:
+    """An amble ahead fell after 6.3 s."""
+    run = Walk(gait, seed=3, values=(('cadence_scale', 0.7),))
+    run.loop.command(*velocity)
+    assert run.walk(8.0)
 
 
 def test_a_blend_is_limited_between_its_gaits_on_any_robot() -> None:

@@ -73,7 +73,7 @@ def settings(seeds: Iterable[int], share: tuple[float, float]
         radius, growth = some(0.3, 1.6), some(0.5, 30.0)
         gait = network(
             str(rng.choice(list(GAITS))), rho=growth / radius**2, radius=radius,
-            coupling_gain=growth * some(*share), cadence_scale=some(0.25, 3.0),
+            coupling_gain=growth * some(*share), paced=some(0.25, 3.0),
             coupling_graph=str(rng.choice(['all_to_all', 'ring', 'path', 'star',
                                            'directed_ring'])))
         inhibition = InhibitionParameters(
