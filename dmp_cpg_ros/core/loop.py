@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
-from dmp_cpg_ros.core.certificates.gate import Change, Running
+from dmp_cpg_ros.core.certificates.gate import Running
+from dmp_cpg_ros.core.certificates.verdict import Change
 from dmp_cpg_ros.core.clock import TickClock
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.body_estimate import estimated_state

@@ -157,7 +157,11 @@ def certificates() -> list[Row]:
     loop, new = run.loop, count(1)
 
     other = _walking()[1].loop  # of which the gait is on its way to another
-    more = _walking({'voting': True, 'auto_gait': True, 'inhibited_legs': ['auto']})[1].loop
+    voting: dict[str, object] = {'voting': True, 'coupling_gain': 200.0}
+    more, path, star = (_walking({'voting': True, **of})[1].loop for of in (
+        {'auto_gait': True, 'inhibited_legs': ['auto']},
+        {**voting, 'coupling_graph': 'path', 'auto_gait': True, 'inhibited_legs': ['auto']},
+        {**voting, 'coupling_graph': 'star', 'vote_majority': 2}))
 
     def change(of: WalkingLoop = loop, accepted: bool = True, **values: Callable[[int], object]
                ) -> Callable[[], object]:
@@ -189,6 +193,19 @@ def certificates() -> list[Row]:
             more, cadence_scale=lambda n: 1.0 + 1e-5 * n)),
         ('a refused one, with one that works', change(
             more, accepted=False, cadence_scale=lambda n: 4.0 - 1e-4 * n)),
+        ('another coupling gain on a path with votes, three gaits and any leg', change(
+            path, coupling_gain=lambda n: 200.0 + 1e-3 * n)),
+        ('another cadence there', change(path, cadence_scale=lambda n: 1.0 + 1e-5 * n)),
+        ('a refused region, with one that works', change(
+            path, accepted=False, region_radius=lambda n: 0.1 + 1e-6 * n)),
+        ('another coupling gain on a star with votes', change(
+            star, coupling_gain=lambda n: 200.0 + 1e-3 * n)),
+        ('refused values of two and a clamp, with some that work', change(
+            star, accepted=False, region_radius=lambda n: 0.28 + 1e-6 * n,
+            max_speed=lambda n: 0.77, vote_limit=lambda n: 1.0)),
+        ('refused values of three, of which votes lose one', change(
+            star, accepted=False, cadence_scale=lambda n: 4.0 - 1e-5 * n,
+            coupling_gain=lambda n: 60.0, rho=lambda n: 3.0)),
     ], time.process_time)  # another process may compute them beside the ticks
     return rows[1:]
 

@@ -181,7 +181,7 @@ class Oscillators(WalkingLoop):
 class _Unheld(Running):
     """Parameters of which any may change in a stop."""
 
-    def refused_now(self, *_: object) -> str:
+    def refused_now(self, *_: object, **__: object) -> str:
         """Nothing has to wait."""
         return ''
 

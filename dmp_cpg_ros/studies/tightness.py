@@ -28,7 +28,7 @@ from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates import step
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.network import Setting
-from dmp_cpg_ros.core.contraction import capture, heterogeneity, inhibited, synchronisation, voting
+from dmp_cpg_ros.core.contraction import capture, heterogeneity, inhibited, synchronisation
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
@@ -41,6 +41,7 @@ from dmp_cpg_ros.core.maths.exponential import phi_functions
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.core.voting import thresholds
 from dmp_cpg_ros.paper.entry_tube import entry_tube
 from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
 from dmp_cpg_ros.suite import load_gait
@@ -315,9 +316,9 @@ def _stays_together(system: CanonicalSystem, mismatch: float) -> bool:
 def vote_row(graph: str) -> Row:
     """Weight with which two votes stop the gait, against the equilibrium's own threshold."""
     system = network(graph)
-    certified = voting.certified_threshold(system, OMEGA, (0, 1), REGION)
+    certified = thresholds.certified_threshold(system, OMEGA, (0, 1), REGION)
     return Row('vote of two', graph, 'alpha [1/s]', certified,
-               voting.rest_threshold(system, OMEGA, (0, 1), REGION))
+               thresholds.rest_threshold(system, OMEGA, (0, 1), REGION))
 
 
 def step_row(graph: str) -> Row:

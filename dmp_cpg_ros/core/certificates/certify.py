@@ -22,7 +22,7 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.coupling import degrees
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.certificates import network as of_network
-from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, discharged
+from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, discharged, lost
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.step import step_inequalities, stepped_network
 from dmp_cpg_ros.core.certificates.timing import LONGEST_STOP, time_to_rest, time_to_walking
@@ -40,9 +40,12 @@ from dmp_cpg_ros.core.reference.stop_distance import stop_distance
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import FootPath
 
+BEFORE_VOTES = 'time_to_walking'
+"""Name of the last row before those of votes."""
+
 
 def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = False,
-            until_lost: bool = False) -> Certificate:
+            until_lost: bool = False, until: str = '') -> Certificate:
     """Compute the certificate of running parameters.
 
     Parameters
@@ -53,10 +56,13 @@ def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = Fal
         Where ``auto`` chooses the leg, those of which the worst is certified; the eligible ones
         without.
     required_only : bool
-        Whether inequalities that are not required are left out, which are most of the work.
+        Whether inequalities that are not required are left out, which are most of the work, and
+        those of votes where another required one does not hold.
     until_lost : bool
         Whether rows after a required one that does not hold may be missing: so it is known at a
         fraction of the cost that the certificate does not hold.
+    until : str
+        Name of a row after which others may be missing; of ``BEFORE_VOTES`` or any other one.
 
     Returns
     -------
@@ -64,14 +70,14 @@ def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = Fal
     """
     p, votes = s.parameters.inhibition, cache(partial(vote_inequalities, s))  # of all legs alike
     if not p.auto:
-        return _certificate(s, required_only, until_lost, votes)
+        return _certificate(s, required_only, until_lost, until, votes)
     legs = legs or eligible_legs(s.network, p)
     number = degrees(s.network.parameters.coupling_graph, len(LEGS))
     found = []
     for leg in {number[leg]: leg for leg in legs}.values():       # others are alike
         found.append(_certificate(replace(s, parameters=replace(
             s.parameters, inhibition=replace(p, inhibited_legs=(LEGS[leg],)))),
-            required_only, until_lost, votes))
+            required_only, until_lost, until, votes))
         if until_lost and not found[-1].holds:
             return found[-1]
     rows = [min(same, key=lambda row: (row.holds, row.margin))
@@ -88,7 +94,7 @@ def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = Fal
         legs=tuple(LEGS[leg] for leg in sorted(legs)))
 
 
-def _certificate(s: Setting, required_only: bool, until_lost: bool,
+def _certificate(s: Setting, required_only: bool, until_lost: bool, until: str,
                  votes: Callable[[], list[Inequality]]) -> Certificate:
     p, network = s.network.parameters, s.network
     analysis = of_network.analyse_network(network, s.parameters.inhibition, s.span)
@@ -96,7 +102,7 @@ def _certificate(s: Setting, required_only: bool, until_lost: bool,
     rows: list[Inequality] = []
     for row in of_network.network_inequalities(s, analysis):
         rows.append(row)
-        if until_lost and not row.holds:
+        if row.name == until or (until_lost and not row.holds):
             return Certificate(tuple(rows), contraction.reach, s.span.omega[1])
     rest = analysis.rest
     rates = (found.rate, max(contraction.rate, analysis.capture.rate), 2.0 * p.rho * p.radius**2)
@@ -127,10 +133,10 @@ def _certificate(s: Setting, required_only: bool, until_lost: bool,
     rows += [
         Inequality('time_to_rest', stop, LONGEST_STOP, 's', 'bound', 'longest stop', CONTINUOUS,
                    'from a request at any phase of the locked gait, at any speed, to rest'),
-        Inequality('time_to_walking', start, LONGEST_STOP, 's', 'bound', 'longest start',
+        Inequality(BEFORE_VOTES, start, LONGEST_STOP, 's', 'bound', 'longest start',
                    CONTINUOUS, 'from release at rest to locked phases and full swings', False)]
     rows = discharged(rows, alike=s.alike)
-    if not until_lost or all(row.holds or not row.required for row in rows):
+    if until != BEFORE_VOTES and not (required_only and lost(rows)):
         rows += votes()
     return Certificate(
         tuple(rows), contraction.reach, s.span.omega[1], stop, start,

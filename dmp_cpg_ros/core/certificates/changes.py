@@ -14,11 +14,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 from itertools import combinations
 
-from dmp_cpg_ros.core.certificates.certify import certify
-from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, discharged
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, certify
+from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, discharged, lost
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.votes import vote_inequalities
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS
@@ -30,6 +30,7 @@ from dmp_cpg_ros.core.gait.transition import SETTLING_RATE, STANDING, GaitTransi
 from dmp_cpg_ros.core.inhibition.entry import eligible_legs, farthest_way
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.core.voting.parameters import VotingParameters
@@ -37,7 +38,8 @@ from dmp_cpg_ros.core.voting.parameters import VotingParameters
 
 def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,
                     tick_s: float, acting_cadence: float | None = None, *,
-                    required_only: bool = False, until_lost: bool = False) -> Certificate:
+                    required_only: bool = False, until_lost: bool = False, until: str = ''
+                    ) -> Certificate:
     """Compute the certificate of some gaits and of every change between them.
 
     Parameters
@@ -52,9 +54,7 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
         Control tick [s].
     acting_cadence : float, optional
         Factor on the cadence that still acts, on its way to that of the parameters.
-    required_only : bool
-        Whether inequalities that are not required are left out, which are most of the work.
-    until_lost : bool
+    required_only, until_lost, until : bool, bool, str
         As for :func:`~dmp_cpg_ros.core.certificates.certify.certify`.
 
     Returns
@@ -74,12 +74,11 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
     share = max((way.fastest(rate) for way in ways), default=0.0)
     span = _widened(p, networks, share)
     unvoted = replace(p, voting=VotingParameters())
-    setting = replace(Setting.of(networks[0], unvoted, tick_s, span), way=2.0 * math.pi if ways
-                      else max(farthest_way(network, p.inhibition) for network in networks))
-    # A gait that changes at rest keeps the leg that holds it.
-    legs = set[int]().union(*(eligible_legs(network, p.inhibition) for network in networks))
-    whole = certify(setting, legs, required_only=required_only, until_lost=until_lost)
-    if until_lost and not whole.holds:
+    setting = Setting.of(networks[0], unvoted, tick_s, span, 2.0 * math.pi if ways else max(
+        farthest_way(network, p.inhibition) for network in networks))
+    legs = _eligible_in_any(networks, p.inhibition) if p.inhibition.auto else ()
+    whole = certify(setting, legs, required_only=required_only, until_lost=until_lost, until=until)
+    if (until_lost and not whole.holds) or until not in ('', BEFORE_VOTES):
         return whole
     pause = 0.0 if not ways else (
         math.log(span.omega[1] / (STANDING * span.omega[0])) / SETTLING_RATE + tick_s)
@@ -87,8 +86,8 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
     rows = [_changed(row, bound, p.leg, 'gait' if ways else 'cadence')
             for row in whole.inequalities]
     rows = discharged(rows, alike=replace(setting, parameters=p).alike)
-    if not until_lost or all(row.holds or not row.required for row in rows):
-        rows += _votes(p, gaits, scale, tick_s, acting_cadence, until_lost)
+    if until != BEFORE_VOTES and not (required_only and lost(rows)):
+        rows += votes_among(p, networks, tick_s, until_lost=until_lost)
     if ways and not required_only:
         rows.append(Inequality(
             'offset_rate', share * span.omega[1], whole['frequency_mismatch'].right, 'rad/s',
@@ -121,29 +120,32 @@ def refused_change(parameters: SuiteParameters, walked: Sequence[Gait], wanted: 
             f'{certificate.explained()}')
 
 
-def _votes(p: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale, tick_s: float,
-           acting_cadence: float | None, until_lost: bool) -> list[Inequality]:
-    """What votes can do in the gaits, of each inequality the worst, or all of the first in which
-    one fails: their clamp follows the cadence, and a stop waits until a change of gait is over.
+def votes_among(p: SuiteParameters, networks: Sequence[GaitNetwork], tick_s: float, *,
+                until_lost: bool = False) -> list[Inequality]:
+    """What votes can do in some networks, of each inequality the worst, or all of the first in
+    which one fails: their clamp follows the cadence, and a stop waits until a change of gait is
+    over.
     """
     worst: dict[str, Inequality] = {}
-    for cadence in _cadences(p, acting_cadence):
-        for gait in gaits:
-            for row in _votes_in(p, gait, scale, tick_s, cadence):
-                known = worst.get(row.name)
-                if known is None or not row.margin > known.margin:
-                    worst[row.name] = replace(row, sentence=f'{row.sentence}, in {gait.name}')
-            if until_lost and not all(row.holds for row in worst.values()):
-                return list(worst.values())
+    for network in networks:
+        for row in vote_inequalities(Setting.of(network, p, tick_s, way=2.0 * math.pi)):
+            known = worst.get(row.name)
+            if known is None or not row.margin > known.margin:
+                worst[row.name] = replace(
+                    row, sentence=f'{row.sentence}, in {network.gait.name}')
+        if until_lost and lost(worst.values()):
+            break
     return list(worst.values())
 
 
-@lru_cache(maxsize=32)
-def _votes_in(p: SuiteParameters, gait: Gait, scale: BodyScale, tick_s: float, cadence: float
-              ) -> tuple[Inequality, ...]:
-    """Of one gait at one cadence: what moves to a cadence and what has come there share it."""
-    network = GaitNetwork(replace(p.canonical, cadence_scale=cadence), gait, scale)
-    return tuple(vote_inequalities(Setting.of(network, p, tick_s)))
+def _eligible_in_any(networks: Sequence[GaitNetwork], inhibition: InhibitionParameters
+                     ) -> set[int]:
+    """Legs that are eligible in some network: one that changes at rest keeps what holds it."""
+    legs = set[int]()
+    for network in sorted(networks, key=lambda each: each.gait.omega(0.0, each.scale)):
+        if len(legs) < len(LEGS):  # slow ones first, in which more are
+            legs.update(eligible_legs(network, inhibition))
+    return legs
 
 
 def _changed(row: Inequality, bound: float, leg: LegParameters, what: str) -> Inequality:

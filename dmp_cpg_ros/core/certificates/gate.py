@@ -1,10 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters that change while the suite runs: may they, and what is the nearest that may.
-
-A change that would lose the certificate is refused with the inequality that fails, both its sides,
-and what works: near values on the straight way from the running numbers, the other words.
-"""
+"""What runs, as far as certificates are computed from it, and what of it may change now."""
 
 from __future__ import annotations
 
@@ -12,28 +8,25 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import AUTO, Inhibition
-from dmp_cpg_ros.core.certificates.certify import certify
-from dmp_cpg_ros.core.certificates.changes import all_networks, certify_changes, refused_change
-from dmp_cpg_ros.core.certificates.inequality import Certificate
-from dmp_cpg_ros.core.certificates.network import Setting
-from dmp_cpg_ros.core.certificates.suggest import nearest_values
+from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, certify
+from dmp_cpg_ros.core.certificates.changes import all_networks, certify_changes, votes_among
+from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, lost
+from dmp_cpg_ros.core.certificates.network import NETWORK_ROWS, Setting
 from dmp_cpg_ros.core.certificates.timing import later_arming
+from dmp_cpg_ros.core.certificates.votes import VOTE_ROWS
 from dmp_cpg_ros.core.contraction.capture import RADIUS_TOLERANCE, capture_set
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, inhibited_contraction
-from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.entry import eligible_legs
 from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.parameters import typed
 from dmp_cpg_ros.core.reference.stop_distance import stop_distance
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import UNCERTIFIED_VOTES, VOTE_SOURCES, SuiteParameters
@@ -47,10 +40,6 @@ UNCERTIFIED = frozenset(
 _CAPTURING = frozenset(('rho', 'radius', 'coupling_gain', 'coupling_graph', 'inhibition_gain',
                         'region_radius', 'inhibited_legs'))
 """Parameters that decide which set inhibition holds the legs in."""
-
-_ROUNDS, _FEWER_ROUNDS = 5, 3
-"""How often the way to what is refused is halved: of one gait without votes, and else."""
-
 
 @dataclass(frozen=True)
 class Running:
@@ -88,7 +77,29 @@ class Running:
 
     def holds(self) -> bool:
         """Whether the certificate holds, at less cost where it does not."""
-        return _certificate(self._of_certificate, False, True).holds
+        return not self.first_lost()
+
+    def first_lost(self, among: str = '') -> str:
+        """Name of a required inequality that does not hold; empty when all do. Where one is named,
+        only it and what is computed before it are sure to be looked at.
+        """
+        if among in VOTE_ROWS:
+            failing = lost(self.votes(until_lost=True))
+        else:
+            until = among if among in NETWORK_ROWS else BEFORE_VOTES if among else ''
+            failing = _certificate(self._of_certificate, False, True, until).failing
+        return failing[0].name if failing else ''
+
+    def votes(self, *, until_lost: bool = False) -> list[Inequality]:
+        """Inequalities of voting, or all of the first gait in which one is lost."""
+        of = self._of_certificate
+        return votes_among(of.parameters, of.networks, of.tick_s, until_lost=until_lost)
+
+    @property
+    def networks(self) -> list[GaitNetwork]:
+        """Networks of all gaits, at the cadence of the parameters and at the one that acts."""
+        return all_networks(
+            self.parameters, (self.gait, *self.others), self.scale, self.acting_cadence)
 
     @property
     def settled(self) -> Running:
@@ -107,7 +118,12 @@ class Running:
     @property
     def _of_certificate(self) -> Running:
         return replace(self, parameters=replace(self.parameters, motion=None),
-                       acting_cadence=self.acting_cadence if self.moving else None)
+                       acting_cadence=self.moving_cadence)
+
+    @property
+    def moving_cadence(self) -> float | None:
+        """Factor on the cadence that acts, where it is another than that of the parameters."""
+        return self.acting_cadence if self.moving else None
 
     @property
     def moving(self) -> bool:
@@ -139,7 +155,7 @@ class Running:
                              math.hypot(*command[:2]), self.tick_s, turning, lead_s)
 
     def refused_now(self, before: Running, network: GaitNetwork, inhibition: Inhibition,
-                    x: Array) -> str:
+                    x: Array, *, ahead: bool = False) -> str:
         """Why a change of what captures the legs has to wait; empty when it may be made.
 
         While the gait runs every certified change may. Once inhibition is armed legs may be caught
@@ -156,16 +172,22 @@ class Running:
             That acts.
         x : ndarray (4, 2)
             States.
+        ahead : bool
+            Whether inhibition may have been armed, to act later, without its being heard here.
         """
         acting, armed = network.acting_gains(inhibition, x), inhibition.gains
         held_by = acting if acting.any() else armed
         served = before.parameters.inhibition.gains_on(int(held_by.argmax())) > 0.0
         # the service's gain is above that of any vote, whatever it was when it was asked for
         voted = bool(held_by[served].min(initial=math.inf) <= held_by[~served].max(initial=0.0))
-        names = sorted((_CAPTURING | {'cadence_scale'} if voted else _CAPTURING)
+        names = sorted((_CAPTURING | {'cadence_scale'} if voted and armed.any() else _CAPTURING)
                        & before.differences(self).keys())
-        if not (names and inhibition.requested and armed.any()):
+        if not (names and inhibition.requested):
             return ''
+        if not armed.any():
+            return '' if not ahead else (
+                f'{", ".join(names)} cannot change while a stop is under way, in which legs may '
+                'be caught at any time; ask again when they are at rest')
         if voted:
             return (f'{", ".join(names)} cannot change while votes alone hold the legs; ask again '
                     "while the gait runs or the service's stop holds it")
@@ -183,7 +205,7 @@ class Running:
         is the one on which gains act; empty when nothing does.
         """
         p, held_by = self.parameters, int(gains.argmax())
-        networks = all_networks(p, (self.gait, *self.others), self.scale, self.acting_cadence)
+        networks = self.networks
         fastest = max(Setting.of(network, p, self.tick_s).span.omega[1] for network in networks)
         system = networks[0].system
         if p.inhibition.auto and (np.count_nonzero(gains) != 1 or any(
@@ -228,123 +250,12 @@ class Running:
 
 
 @lru_cache(maxsize=32)
-def _certificate(of: Running, whole: bool, until_lost: bool = False) -> Certificate:
+def _certificate(of: Running, whole: bool, until_lost: bool = False, until: str = ''
+                 ) -> Certificate:
     if of.others or of.moving:
         return certify_changes(
             of.parameters, (of.gait, *of.others), of.scale, of.tick_s, of.acting_cadence,
-            required_only=not whole, until_lost=until_lost)
+            required_only=not whole, until_lost=until_lost, until=until)
     network = GaitNetwork(of.parameters.canonical, of.gait, of.scale)
     return certify(Setting.of(network, of.parameters, of.tick_s),
-                   required_only=not whole, until_lost=until_lost)
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Whether a change may be made.
-
-    Attributes
-    ----------
-    certificate, settled : Certificate
-        With the change, for every cadence on the way to that of the parameters; and for that one.
-    accepted : bool
-        Whether no inequality is lost by it.
-    reason : str
-        Why not: the inequalities with both sides, and what is nearest; empty when accepted.
-    """
-
-    certificate: Certificate
-    settled: Certificate
-    accepted: bool
-    reason: str = ''
-
-
-@dataclass(frozen=True)
-class Change:
-    """A change that is asked for, with everything that the verdict depends on.
-
-    Attributes
-    ----------
-    present, held : Running, Certificate
-        What runs, and its certificate when the cadence is settled.
-    proposed : Running
-        What is asked for.
-    gaits : tuple of Gait
-        Walked until those of ``proposed`` are, both ends of a change included; may repeat.
-    """
-
-    present: Running
-    held: Certificate
-    proposed: Running
-    gaits: tuple[Gait, ...] = ()
-
-    def verdict(self) -> Verdict:
-        """Judge: accepted when no required inequality is lost, nor gets worse where it fails."""
-        of, before = self.proposed, self.present
-        certificate, settled = of.certificate(), of.settled.certificate()
-        refused = refused_change(of.parameters, self.gaits, (of.gait, *of.others), of.scale,
-                                 of.tick_s, of._of_certificate.acting_cadence)
-        lost = [entry for entry in certificate.failing
-                if self.held[entry.name].holds or entry.margin < self.held[entry.name].margin]
-        same = (of.gait, of.others) == (before.gait, before.others)
-        if refused and not (same and lost):
-            refused += '; ask again when the gait has changed' * same
-            return Verdict(certificate, settled, False, refused)
-        if not lost:
-            return Verdict(certificate, settled, True)
-        reason = ' | '.join(entry.explained() for entry in lost)
-        return Verdict(certificate, settled, False, f'{reason}; {self._nearest(self.held.holds)}')
-
-    def covers(self, other: Change) -> bool:
-        """Whether the verdict on this change is one on another, in which a cadence acts that lies
-        between the one that acts here and the one that is asked for: all between are certified.
-        """
-        return self._settled == other._settled and self.proposed.covers(other.proposed)
-
-    @property
-    def _settled(self) -> Change:
-        return replace(self, present=self.present.settled, proposed=self.proposed.settled)
-
-    def _nearest(self, held: bool) -> str:
-        """Nearest values that work, as text."""
-        differences = self.present.differences(self.proposed)
-        numbers = {name: pair for name, pair in differences.items() if isinstance(pair[0], float)}
-        words = {name: pair[1] for name, pair in differences.items() if name not in numbers}
-        if words and not _holds(self.present.changed(words)):
-            return self._choices(words)
-        if not (held or words) or not numbers:
-            return 'nothing nearer is known: the running parameters are not certified themselves'
-        asked = {name: wanted for name, (_, wanted) in numbers.items()}  # refused just now
-        values = nearest_values(
-            numbers, lambda at: at != asked and _holds(self.present.changed({**words, **at})),
-            _FEWER_ROUNDS if self.present.others or self.proposed.values['voting'] else _ROUNDS)
-        told = ', '.join(f'{name} = {typed(value)}' for name, value in values.items())
-        return f'nearest value{"s that work" if len(values) > 1 else " that works"}: {told}'
-
-    def _choices(self, words: Mapping[str, Any]) -> str:
-        """Other words that work in place of those that were asked for."""
-        found = []
-        for name, asked in words.items():
-            working = [typed(choice) for choice in _alternatives(self.proposed, name)
-                       if choice != asked and _holds(self.proposed.changed({name: choice}))]
-            found.append(f'{name} = {" or ".join(working)}' if working else
-                         f'no other {name} with the rest as it is')
-        return f'what works: {"; ".join(found)}'
-
-
-def _holds(running: Running) -> bool:
-    try:
-        return running.holds()
-    except DmpCpgError:
-        return False
-
-
-def _alternatives(running: Running, name: str) -> list[Any]:
-    """All values of a parameter that is a choice; for several at once, one up to all of them."""
-    entry = next(held.__dataclass_fields__[name] for held in running.parameters.sets.values()
-                 if name in held.__dataclass_fields__)
-    choices = entry.metadata['choices']
-    if not isinstance(entry.default, tuple):
-        return list(choices)
-    several = [choice for choice in choices if choice != AUTO]
-    return [*((choice,) for choice in choices), *(
-        some for size in range(2, len(several) + 1) for some in combinations(several, size))]
+                   required_only=not whole, until_lost=until_lost, until=until)

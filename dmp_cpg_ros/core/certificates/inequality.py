@@ -130,6 +130,11 @@ def discharged(rows: Iterable[Inequality], *, alike: bool) -> list[Inequality]:
     return [now(row) for row in rows]
 
 
+def lost(rows: Iterable[Inequality]) -> tuple[Inequality, ...]:
+    """Required inequalities that do not hold."""
+    return tuple(row for row in rows if row.required and not row.holds)
+
+
 @dataclass(frozen=True)
 class Certificate:
     """Inequalities of one set of parameters.
@@ -179,7 +184,7 @@ class Certificate:
     @property
     def failing(self) -> tuple[Inequality, ...]:
         """Required inequalities that do not hold."""
-        return tuple(entry for entry in self.inequalities if entry.required and not entry.holds)
+        return lost(self.inequalities)
 
     @property
     def holds(self) -> bool:

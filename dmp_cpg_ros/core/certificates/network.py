@@ -50,6 +50,10 @@ EXPECTED_TICKS = 3
 """Ticks that a sample should be allowed to be old: held for one, a tick late, one message lost."""
 
 
+NETWORK_ROWS = ('synchronisation', 'contraction', 'capture', 'rest_in_region')
+"""Names of the required inequalities of the oscillators, in their order."""
+
+
 @dataclass(frozen=True)
 class Setting:
     """What a certificate is computed from.
@@ -76,8 +80,8 @@ class Setting:
 
     @classmethod
     def of(cls, network: GaitNetwork, parameters: SuiteParameters, tick_s: float,
-           span: OperatingRange | None = None) -> Setting:
-        """Setting of running parameters, by default with the speeds and cadences of the gait.
+           span: OperatingRange | None = None, way: float | None = None) -> Setting:
+        """Setting of running parameters, by default with speeds, cadences and way of the gait.
 
         Raises
         ------
@@ -88,7 +92,7 @@ class Setting:
             raise ParameterError(f'tick = {tick_s!r} s must be positive and finite')
         return cls(network, parameters, tick_s, span or operating_range(
             network, parameters.inhibition, parameters.reference),
-            farthest_way(network, parameters.inhibition))
+            farthest_way(network, parameters.inhibition) if way is None else way)
 
     @property
     def alike(self) -> bool:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from dmp_cpg_ros.core.certificates.inequality import Certificate
@@ -88,31 +89,41 @@ def suggest_gains(running: Running) -> Suggestion | None:
 
 
 def nearest_values(numbers: Mapping[str, tuple[float, float]],
-                   holds: Callable[[dict[str, float]], bool], rounds: int) -> dict[str, float]:
+                   lost: Callable[[dict[str, float], str], str], name: str, rounds: int
+                   ) -> dict[str, float]:
     """Values nearest to the wanted ones, on the straight way from those that run, that still work.
+
+    What one inequality needs is looked for first; then whether the others hold there.
 
     Parameters
     ----------
     numbers : mapping of str to (float, float)
-        Names with the value that runs, which works, and the one that is asked for.
-    holds : callable
-        Whether values work.
+        Names with the value that runs, which works, and the one that is asked for, which does not.
+    lost : callable (values, among) → str
+        Name of an inequality that values lose, empty when none; where one is named, others than
+        that need not be looked at.
+    name : str
+        An inequality that the wanted values lose.
     rounds : int
         How often the way is halved.
 
     Returns
     -------
     dict of str → float
-        The wanted values when they work, else found by bisection of the way, and rounded towards
-        those that run.
+        Found by bisection of the way, and rounded towards those that run.
     """
     def between(share: float) -> dict[str, float]:
-        return {name: after if share == 1.0 else before + share * (after - before)
-                for name, (before, after) in numbers.items()}
+        return {key: before + share * (after - before)
+                for key, (before, after) in numbers.items()}
 
-    share = 1.0 if holds(between(1.0)) else last_that_holds(
-        lambda at: holds(between(at)), 0.0, 1.0, rounds)
-    return {name: _shortened(value, numbers[name][0]) for name, value in between(share).items()}
+    def kept(most: float, among: str, at: float) -> bool:
+        return at < most and not lost(between(at), among)
+
+    share = 1.0
+    while name and share > 0.0:
+        share = last_that_holds(partial(kept, share, name), 0.0, 1.0, rounds)
+        name = lost(between(share), '') if share > 0.0 else ''
+    return {key: _shortened(value, numbers[key][0]) for key, value in between(share).items()}
 
 
 def _shortened(value: float, towards: float) -> float:

@@ -11,7 +11,8 @@ must be no rest inside the regions at any cadence.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -23,18 +24,17 @@ from dmp_cpg_ros.core.contraction import inhibited
 from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, SAMPLED
-from dmp_cpg_ros.core.contraction.voting import (
-    different_voters,
-    enough_for_all,
-    shared_capture,
-    too_weak_for_all,
-)
+from dmp_cpg_ros.core.contraction.voting import different_voters, shared_capture
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.voting.parameters import VotingParameters
+from dmp_cpg_ros.core.voting.thresholds import enough_for_all, too_weak_for_all
 from dmp_cpg_ros.core.voting.voting import VoteClamp, vote_clamp
+
+VOTE_ROWS = ('votes_contraction', 'votes_suffice', 'votes_needed', 'votes_time_to_rest')
+"""Names of the inequalities of voting, in their order."""
 
 
 @dataclass(frozen=True)
@@ -108,13 +108,30 @@ def _under(s: Setting, gains: Array) -> tuple[float, inhibited.InhibitedContract
     return float(np.nanmax(capture.needed_gain)), found, bound
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """A setting, and all of it that the rows of votes depend on: legs in their places are alike in
+    all gaits, and who votes has nothing to do with whom the service inhibits.
+    """
+
+    of: tuple[object, ...]
+    setting: Setting = field(compare=False)
+
+
 def vote_inequalities(s: Setting) -> list[Inequality]:
     """Inequalities of voting, for whoever votes; none when there is no voting. All are required:
     who lets legs vote relies on them.
     """
+    p, inhibition = s.parameters, replace(s.parameters.inhibition, inhibited_legs=LEGS)
+    return [] if not p.voting.voting else list(_rows(_Asked(
+        (replace(s.network.parameters, cadence_scale=1.0), inhibition, p.voting, p.reference,
+         p.leg, s.tick_s, s.span), s)))
+
+
+@lru_cache(maxsize=32)
+def _rows(asked: _Asked) -> tuple[Inequality, ...]:
+    s = asked.setting
     p, voting, system = s.parameters.inhibition, s.parameters.voting, s.network.system
-    if not voting.voting:
-        return []
     clamp, count = vote_clamp(s.network, p, voting, s.span), voting.majority
     legs, acting = np.arange(system.graph.size), max(clamp.gain, 1e-9)
     needed, found, bounds = zip(*(_under(s, np.where(np.isin(legs, voters), acting, 0.0))
@@ -125,7 +142,7 @@ def vote_inequalities(s: Setting) -> list[Inequality]:
         'on the capture set', 'growth on the capture set')
     fewer = {1: 'without a vote nothing stops', 2: 'one leg alone cannot stop'}.get(
         count, f'{count - 1} legs cannot stop')
-    return [
+    return (
         Inequality('votes_contraction', worst.growth, worst.inhibition_rate, '1/s', left_is,
                    f'connectivity of L_K + k_inh alpha E_{count}', CONTINUOUS,
                    f'the network contracts {where} under the votes of {who}'),
@@ -136,4 +153,4 @@ def vote_inequalities(s: Setting) -> list[Inequality]:
         Inequality('votes_needed', clamp.gain, clamp.window.highest, '1/s', 'k_inh alpha_max',
                    f'rest held by {count - 1}', SAMPLED, f'{fewer} the gait'),
         Inequality('votes_time_to_rest', max(bounds), LONGEST_STOP, 's', 'bound', 'longest stop',
-                   CONTINUOUS, 'from the vote that stops the locked gait to rest')]
+                   CONTINUOUS, 'from the vote that stops the locked gait to rest'))

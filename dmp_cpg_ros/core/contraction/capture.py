@@ -177,10 +177,12 @@ def outward_growth(system: CanonicalSystem, omega: Array, D: float, u: Array) ->
 def outward_growth_within(system: CanonicalSystem, omega: Array, D: float, u: Array) -> Array:
     """Largest g_i(v) over v ≤ u_i, which rises with u as the iteration for the box needs [1/s].
 
-    For r = |x_d| it is g_i itself. Else the radial part has its other maxima where c leaves or
-    reaches ±|x_d|, or where |x| = r/√3 with x along x_d.
+    For r = |x_d| it is g_i itself up to where c reaches −|x_d|. Else the radial part has its other
+    maxima where c leaves or reaches ±|x_d|, or where |x| = r/√3 with x along x_d.
     """
     r = system.radius
+    if np.all(r == D) and np.all(u <= 4.0 / 3.0 * D):
+        return outward_growth(system, omega, D, u)
     reach = r / np.sqrt(3.0)
     root = np.sqrt(np.maximum(4.0 * D**2 + 3.0 * (r**2 - D**2), 0.0))
     places = np.stack([u, 0.0 * r, reach - D, reach + D, (root - 2.0 * D) / 3.0,
@@ -246,11 +248,12 @@ def _grounded_solution(L: Array, free: Mask) -> Callable[[Array, Array], Array]:
     grounded, beside = L[np.ix_(free, free)], L[np.ix_(free, kept)]
     firm = known and any_free and slowest_rate(grounded) > 1e-9 * float(np.abs(grounded).max())
 
+    inverse = np.linalg.inv(grounded) if firm else None
+
     def solution(g: Array, u: Array) -> Array:
         solved = np.where(heard, u, np.inf)                 # no kept node acts on the others
         if known and any_free:
-            solved[free] = np.linalg.solve(
-                grounded, g[free] - beside @ u[kept]) if firm else np.inf
+            solved[free] = np.inf if inverse is None else inverse @ (g[free] - beside @ u[kept])
         return solved
 
     return solution

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import atan2, ceil, cos, pi, sin
 
 import numpy as np
@@ -85,9 +85,14 @@ def network_system(parameters: CanonicalParameters, phases: Array) -> CanonicalS
     phases : ndarray (4,)
         Locked phases relative to fl [rad].
     """
-    p, edges = parameters, topology(parameters.coupling_graph, len(LEGS))
-    graph = graph_from_edges(len(LEGS), edges, p.coupling_gain, phases)
-    return CanonicalSystem(graph, p.oscillators, state_at(phases, p.radius))
+    return _network_system(parameters, phases.tobytes())
+
+
+@lru_cache(MOST_KEPT)
+def _network_system(p: CanonicalParameters, phases: bytes) -> CanonicalSystem:
+    graph = graph_from_edges(len(LEGS), topology(p.coupling_graph, len(LEGS)), p.coupling_gain,
+                             places := np.frombuffer(phases))
+    return CanonicalSystem(graph, p.oscillators, state_at(places, p.radius))
 
 
 class GaitNetwork:

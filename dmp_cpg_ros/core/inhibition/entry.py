@@ -10,6 +10,7 @@ at which they are held, so that what is certified for a leg holds wherever it is
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from math import asin, pi, sqrt
 
@@ -68,7 +69,8 @@ def eligible_legs(network: GaitNetwork, inhibition: InhibitionParameters) -> tup
     fastest = max(float(end.cadence.max()) / end.cadence_scale for end in gait.ends)
     omega = (2.0 * pi * sqrt(GRAVITY / network.scale.leg_length) * (1.0 + share) * fastest
              * max(gait.cadence_scale, p.cadence_scale))
-    return _holding(p, inhibition.inhibition_gain, inhibition.region_radius, omega)
+    return _holding(replace(p, cadence_scale=1.0), inhibition.inhibition_gain,
+                    inhibition.region_radius, omega)
 
 
 @lru_cache(256)

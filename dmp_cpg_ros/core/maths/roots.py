@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf
+from math import exp, inf
+
+_BEYOND, _STEEPEST = 1.2, 700.0
 
 
 def last_that_holds(holds: Callable[[float], bool], low: float, high: float, rounds: int) -> float:
@@ -31,12 +33,13 @@ def last_that_holds(holds: Callable[[float], bool], low: float, high: float, rou
     return low
 
 
-def sign_change(value: Callable[[float], float], low: float, high: float, precision: float
-                ) -> tuple[float, float]:
+def sign_change(value: Callable[[float], float], low: float, high: float, precision: float,
+                ends: tuple[float, float] = (-inf, inf)) -> tuple[float, float]:
     """Positive numbers between which something becomes positive, or 0, from one that is below 0.
 
-    Goes where a straight line through the ends is 0 (Illinois), over the logarithm, and halves
-    the way at every third trial, where a value is infinite, and where values jump.
+    Goes where a straight line through the ends is 0 (Illinois), over the logarithm, or somewhat
+    beyond where one of slope 1 through the only end that has a value is. At every third trial, and
+    where values are infinite or jump, it halves the way.
 
     Parameters
     ----------
@@ -46,17 +49,23 @@ def sign_change(value: Callable[[float], float], low: float, high: float, precis
         Positive. It is not computed there, but between them.
     precision : float
         Share by which the ends differ at most.
+    ends : (float, float)
+        Values at low and high, where they are known.
 
     Returns
     -------
     low, high : float
         Either the ends that were given, or numbers at which the value is below 0, and not.
     """
-    below, above, least, trial, smooth = -inf, inf, 1.0 + 0.5 * precision, 0, True
+    (below, above), least, trial, smooth = ends, 1.0 + 0.5 * precision, 0, True
     while high > low * (1.0 + precision):
-        trial, most = trial + 1, max(-below, above)
-        line = smooth and trial % 3 > 0 and most < inf
+        trial, most, one = trial + 1, max(-below, above), min(-below, above)
+        straight = smooth and trial % 3 > 0
+        line = straight and most < inf
         middle = low * (high / low) ** (below / (below - above) if line else 0.5)
+        if straight and one < inf == most:
+            middle = low * exp(min(_BEYOND * one, _STEEPEST)) if above == inf else high * exp(
+                -min(_BEYOND * one, _STEEPEST))
         here = value(at := min(max(middle, low * least), high / least))
         if line:
             smooth = abs(here) <= 0.5 * most and (at == middle or (at < middle) == (here < 0.0))

@@ -22,7 +22,6 @@ from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
-from dmp_cpg_ros.core.contraction.voting import MajorityClamp, majority_clamp
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork, network_system
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
@@ -34,6 +33,7 @@ from dmp_cpg_ros.core.voting.parameters import (
     VoteSourceParameters,
     VotingParameters,
 )
+from dmp_cpg_ros.core.voting.thresholds import MajorityClamp, majority_clamp
 from dmp_cpg_ros.core.voting.voters import NEVER, FootWatch, LastGood, UpFilter, VoteSensors
 from dmp_cpg_ros.core.voting.votes import NO_VOTES, OWN_SOURCES, Tally, Vote, VoteMemory
 
@@ -90,8 +90,8 @@ def vote_clamp(network: GaitNetwork, inhibition: InhibitionParameters, voting: V
         The computed clamp is the geometric mean of the window; without a window a little over what
         is certified for the majority, and the whole k_inh where nothing is.
     """
-    window = _window(replace(network.parameters, cadence_scale=1.0), network.gait.phases.tobytes(),
-                     span.omega_armed[1], inhibition.region_radius, voting.majority, span.omega[0])
+    window = _window(replace(network.parameters, cadence_scale=1.0), span.omega_armed[1],
+                     inhibition.region_radius, voting.majority, span.omega[0])
     k_inh = inhibition.inhibition_gain
     if voting.vote_limit > 0.0 or k_inh == 0.0:
         return VoteClamp(voting.vote_limit * k_inh, voting.vote_limit, window)
@@ -103,8 +103,9 @@ def vote_clamp(network: GaitNetwork, inhibition: InhibitionParameters, voting: V
 
 
 @lru_cache(maxsize=MOST_KEPT)
-def _window(parameters: CanonicalParameters, phases: bytes, *of: Any) -> MajorityClamp:
-    return majority_clamp(network_system(parameters, np.frombuffer(phases)), *of)
+def _window(parameters: CanonicalParameters, *of: Any) -> MajorityClamp:
+    """Window of every gait: in locked coordinates offsets are in nothing that it depends on."""
+    return majority_clamp(network_system(parameters, np.zeros(len(LEGS))), *of)
 
 
 def holds_at_rest(network: GaitNetwork, gains: Array, region_radius: float) -> bool:

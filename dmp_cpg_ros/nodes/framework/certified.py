@@ -19,6 +19,7 @@ from dmp_cpg_ros.core import suite_parameters as suite
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates import gate
 from dmp_cpg_ros.core.certificates.inequality import Certificate
+from dmp_cpg_ros.core.certificates.verdict import Change, Verdict
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.gait import Gait
@@ -67,11 +68,14 @@ class Acting(NamedTuple):
         Network, inhibition and states of the last tick.
     gaits : tuple of Gait
         That are walked, both ends of a change between two, and wanted.
+    ahead : bool
+        Whether inhibition is armed by another node, which tells it some time before it acts.
     """
 
     cadence: float | None = None
     stop: tuple[GaitNetwork, Inhibition, Any] | None = None
     gaits: tuple[Gait, ...] = ()
+    ahead: bool = False
 
 
 class Certified:
@@ -101,8 +105,8 @@ class Certified:
         self.gaits, self._scale = known_gaits(node), body_scale(description_of(node))
         self._held: Certificate | None = None
         self._held_in: dict[str, Certificate] = {}
-        self._verdict: gate.Verdict | None = None
-        self._judged: tuple[gate.Change, gate.Verdict] | None = None
+        self._verdict: Verdict | None = None
+        self._judged: tuple[Change, Verdict] | None = None
         self._follower = ParameterFollower(node)
 
     def end(self) -> None:
@@ -210,12 +214,12 @@ class Certified:
             return None
         change = self._ahead(asked[1])
 
-        def learn(verdict: gate.Verdict) -> None:
+        def learn(verdict: Verdict) -> None:
             self._judged = change, verdict
 
         return change.verdict, learn
 
-    def _asked(self, sets: Sets) -> tuple[dict[str, Any], gate.Change] | None:
+    def _asked(self, sets: Sets) -> tuple[dict[str, Any], Change] | None:
         """Values that change, and the change; None where there is nothing to judge: no inequality
         depends on it, or its owner has accepted it. Raises ParameterError for unknown gaits.
         """
@@ -229,15 +233,16 @@ class Certified:
         proposed = self._running(sets)
         if node.parameter_changes.following:
             return None
-        return changed, gate.Change(
+        return changed, Change(
             self._running(self._accepted), self.certificate, proposed, gaits)
 
-    def _waits(self, change: gate.Change) -> str:
+    def _waits(self, change: Change) -> str:
         """Why the change has to wait; empty when it has not."""
-        stop = self._acting().stop
-        return change.proposed.refused_now(change.present, *stop) if stop else ''
+        acting = self._acting()
+        return '' if acting.stop is None else change.proposed.refused_now(
+            change.present, *acting.stop, ahead=acting.ahead)
 
-    def _ahead(self, change: gate.Change) -> gate.Change:
+    def _ahead(self, change: Change) -> Change:
         """The change for the cadence that acts now or soon, whichever is farther from the one that
         is asked for.
         """

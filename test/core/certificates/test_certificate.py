@@ -185,11 +185,12 @@ def test_gains_are_suggested_for_all_gaits_that_are_walked() -> None:
 
 
 def test_the_nearest_value_that_works_works_and_a_little_further_does_not() -> None:
-    def holds(values: dict[str, float]) -> bool:
-        return certificate(suite=with_inhibition(**values)).holds
+    def lost(values: dict[str, float], among: str = '') -> str:
+        failing = [row.name for row in certificate(suite=with_inhibition(**values)).failing]
+        return among if among in failing else '' if among or not failing else failing[0]
 
-    found = nearest_values({'inhibition_gain': (400.0, 100.0)}, holds, 8)
-    assert holds(found) and not holds({'inhibition_gain': found['inhibition_gain'] - 1.2})
-    kept = {'inhibition_gain': 300.0}
-    assert nearest_values({'inhibition_gain': (400.0, 300.0)}, holds, 8) == kept
+    wanted = {'inhibition_gain': (400.0, 100.0)}
+    found = nearest_values(wanted, lost, lost({'inhibition_gain': 100.0}), 8)
+    assert not lost(found) and lost({'inhibition_gain': found['inhibition_gain'] - 1.2})
+    assert nearest_values(wanted, lost, 'synchronisation', 8) == found  # which holds everywhere
     assert PostureParameters() == SuiteParameters().posture

@@ -12,15 +12,18 @@ import pytest
 from core_examples import GAITS, TICK, TICK_NS, network, quadruped, standing_state
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
-from dmp_cpg_ros.core.certificates.gate import Change, Running
+from dmp_cpg_ros.core.certificates.gate import Running
+from dmp_cpg_ros.core.certificates.verdict import Change
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares, KnownGaits, shares_of
-from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, network_system
 from dmp_cpg_ros.core.gait.running import CADENCE_RATE, GaitChoiceParameters, RunningGait
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
+from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER, SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale
+from dmp_cpg_ros.core.voting.thresholds import certified_threshold, rest_threshold
 
 RUNNING = Running(SuiteParameters(), GAITS['amble'], body_scale(quadruped()), TICK)
 WEAK = RUNNING.changed({'coupling_gain': 30.0})
@@ -132,12 +135,12 @@ def test_change_of_gait_is_judged_at_the_cadence_that_acts() -> None:
     assert verdict(replace(wanted, acting_cadence=1.0 + 1e-12)).accepted
 
 
-def test_refusal_tells_the_certificate_of_a_cadence_that_has_settled() -> None:
+def test_a_refusal_on_the_way_to_a_cadence_says_nothing_of_when_it_has_settled() -> None:
     quick = replace(RUNNING, acting_cadence=2.0)
-    verdict = Change(quick, RUNNING.certificate(),
-                     quick.changed({'inhibition_gain': 300.0})).verdict()
+    change = Change(quick, RUNNING.certificate(), quick.changed({'inhibition_gain': 300.0}))
+    verdict = change.verdict()
     assert not verdict.accepted and not verdict.certificate.holds
-    assert verdict.settled.holds
+    assert verdict.settled is None and change.proposed.settled.holds()
 
 
 def test_rounding_is_no_cadence_on_its_way() -> None:
@@ -248,3 +251,44 @@ def test_an_accepted_change_does_not_jump() -> None:
     r = after[-1].r
     assert np.median(rates) == pytest.approx(1.3 * plain.network.omega(r), rel=1e-3)
     assert loop.network.parameters.coupling_graph == 'ring'
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_what_one_inequality_needs_and_then_the_others_is_what_halving_all_of_them_finds(
+    seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    voting: dict[str, object] = {'voting': True, 'coupling_graph': ('path', 'star')[seed % 2],
+                                 'coupling_gain': 200.0, 'vote_majority': seed % 3 + 1}
+    running = RUNNING.changed(voting if seed > 1 else {})
+    names = rng.choice(['coupling_gain', 'inhibition_gain', 'region_radius', 'rho', 'alpha_r',
+                        'cadence_scale', 'vote_limit'], 1 + seed % 3, replace=False)
+    wanted = {str(name): float(running.values[name]) * rng.choice([0.02, 0.1, 2.0, 50.0])
+              for name in names}
+    for name, (least, most) in {'cadence_scale': (0.7, 4.0), 'region_radius': (0.05, 0.9),
+                                'vote_limit': (0.05, 10.0)}.items():
+        if name in wanted:
+            wanted[name] = min(max(wanted[name], least), most)
+    verdict = judge(wanted, running)
+    holds = running.changed(wanted).certificate().holds
+    assert verdict.accepted == holds
+    if not holds:
+        before = {name: running.values[name] for name in wanted}
+        share = last_that_holds(lambda at: running.changed({
+            name: before[name] + at * (wanted[name] - before[name])
+            for name in wanted}).certificate().holds, 0.0, 1.0, 3 if seed > 1 else 5)
+        told = dict(re.findall(r'(\w+) = ([-\d.e+]+)(?:,|$)', verdict.reason.rpartition(': ')[2]))
+        for name in wanted:
+            assert float(told[name]) == pytest.approx(
+                before[name] + share * (wanted[name] - before[name]), rel=2e-3)
+        assert running.changed({name: float(value) for name, value in told.items()}).holds()
+
+
+def test_votes_are_judged_alike_in_gaits_of_one_cadence() -> None:
+    system = network_system(CanonicalParameters(coupling_graph='path'), GAITS['amble'].phases)
+    other = network_system(CanonicalParameters(coupling_graph='path'), GAITS['bound'].phases)
+    for voters in ((0, 1), (0, 3), (1, 2)):
+        assert certified_threshold(system, 9.0, voters, 0.3) == pytest.approx(
+            certified_threshold(other, 9.0, voters, 0.3), rel=2e-4)
+        assert rest_threshold(system, 5.0, voters, 0.3) == pytest.approx(
+            rest_threshold(other, 5.0, voters, 0.3), rel=2e-4)

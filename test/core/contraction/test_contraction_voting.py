@@ -17,14 +17,9 @@ from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
-from dmp_cpg_ros.core.contraction.voting import (
-    certified_threshold,
-    different_voters,
-    majority_clamp,
-    rest_threshold,
-    shared_capture,
-)
+from dmp_cpg_ros.core.contraction.voting import different_voters, shared_capture
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.voting.thresholds import certified_threshold, majority_clamp, rest_threshold
 
 OMEGA, REGION = 10.0, 0.3
 

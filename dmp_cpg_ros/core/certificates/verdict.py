@@ -1,0 +1,168 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters that change while the suite runs: may they, and what is the nearest that may.
+
+A change that would lose the certificate is refused with the inequality that fails, both its sides,
+and what works: near values on the straight way from the running numbers, the other words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
+
+from dmp_cpg_ros.core.canonical.inhibition import AUTO
+from dmp_cpg_ros.core.certificates.changes import refused_change
+from dmp_cpg_ros.core.certificates.gate import Running
+from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality
+from dmp_cpg_ros.core.certificates.suggest import nearest_values
+from dmp_cpg_ros.core.certificates.votes import VOTE_ROWS
+from dmp_cpg_ros.core.contraction.voting import alike
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.parameters import typed
+from dmp_cpg_ros.core.robot_model.state import LEGS
+
+_ROUNDS, _FEWER_ROUNDS = 5, 3
+"""How often the way to what is refused is halved: of one gait without votes, and else."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a change may be made.
+
+    Attributes
+    ----------
+    certificate : Certificate
+        With the change, for every cadence on the way to that of the parameters.
+    settled : Certificate or None
+        For that one; None where the change is refused.
+    accepted : bool
+        Whether no inequality is lost by it.
+    reason : str
+        Why not: the inequalities with both sides, and what is nearest; empty when accepted.
+    """
+
+    certificate: Certificate
+    settled: Certificate | None
+    accepted: bool
+    reason: str = ''
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change that is asked for, with everything that the verdict depends on.
+
+    Attributes
+    ----------
+    present, held : Running, Certificate
+        What runs, and its certificate when the cadence is settled.
+    proposed : Running
+        What is asked for.
+    gaits : tuple of Gait
+        Walked until those of ``proposed`` are, both ends of a change included; may repeat.
+    """
+
+    present: Running
+    held: Certificate
+    proposed: Running
+    gaits: tuple[Gait, ...] = ()
+
+    def verdict(self) -> Verdict:
+        """Judge: accepted when no required inequality is lost, nor gets worse where it fails."""
+        of, before = self.proposed, self.present
+        certificate = of.certificate()
+        lost = [entry for entry in certificate.failing if self._worse(entry)]
+        same = (of.gait, of.others) == (before.gait, before.others)
+        refused = '' if same and lost else refused_change(
+            of.parameters, self.gaits, (of.gait, *of.others), of.scale, of.tick_s,
+            of.moving_cadence)
+        if refused:
+            refused += '; ask again when the gait has changed' * same
+            return Verdict(certificate, None, False, refused)
+        if not lost:
+            return Verdict(certificate, of.settled.certificate(), True)
+        reason = ' | '.join(entry.explained() for entry in lost)
+        return Verdict(certificate, None, False,
+                       f'{reason}; {self._nearest(self.held.holds, lost[0].name)}')
+
+    def _worse(self, entry: Inequality) -> bool:
+        """Whether an inequality that fails held before, or failed by less."""
+        rows = self.held.inequalities
+        if entry.name in VOTE_ROWS and not any(row.name in VOTE_ROWS for row in rows):
+            rows = tuple(self.present.settled.votes())
+        before = next(row for row in rows if row.name == entry.name)
+        return before.holds or entry.margin < before.margin
+
+    def covers(self, other: Change) -> bool:
+        """Whether the verdict on this change is one on another, in which a cadence acts that lies
+        between the one that acts here and the one that is asked for: all between are certified.
+        """
+        return self._settled == other._settled and self.proposed.covers(other.proposed)
+
+    @property
+    def _settled(self) -> Change:
+        return replace(self, present=self.present.settled, proposed=self.proposed.settled)
+
+    def _nearest(self, held: bool, name: str) -> str:
+        """Nearest values that work, as text, where an inequality of a name is lost."""
+        differences = self.present.differences(self.proposed)
+        numbers = {name: pair for name, pair in differences.items() if isinstance(pair[0], float)}
+        words = {name: pair[1] for name, pair in differences.items() if name not in numbers}
+        with_words = self.present.changed(words)
+        if words and _first_lost(with_words, name if numbers else ''):
+            return self._choices(words)
+        if not (held or words) or not numbers:
+            return 'nothing nearer is known: the running parameters are not certified themselves'
+        values = nearest_values(
+            numbers, lambda at, among: _first_lost(with_words.changed(at), among),
+            name, _FEWER_ROUNDS if self.present.others or self.proposed.values['voting']
+            else _ROUNDS)
+        if words and values == {name: before for name, (before, _) in numbers.items()} and (
+                _first_lost(with_words)):
+            return self._choices(words)
+        told = ', '.join(f'{name} = {typed(value)}' for name, value in values.items())
+        return f'nearest value{"s that work" if len(values) > 1 else " that works"}: {told}'
+
+    def _choices(self, words: Mapping[str, Any]) -> str:
+        """Other words that work in place of those that were asked for."""
+        found, holds = [], dict[Any, bool]()
+        for name, asked in words.items():
+            working = []
+            for choice in _alternatives(self.proposed, name):
+                changed = self.proposed.changed({name: choice})
+                kind = name, _alike(changed, choice) if name == 'inhibited_legs' else choice
+                if kind not in holds:
+                    holds[kind] = choice != asked and not _first_lost(changed)
+                if choice != asked and holds[kind]:
+                    working.append(typed(choice))
+            found.append(f'{name} = {" or ".join(working)}' if working else
+                         f'no other {name} with the rest as it is')
+        return f'what works: {"; ".join(found)}'
+
+
+def _first_lost(running: Running, among: str = '') -> str:
+    try:
+        return running.first_lost(among)
+    except DmpCpgError as error:
+        return str(error)
+
+
+def _alike(running: Running, legs: tuple[str, ...]) -> tuple[Any, ...]:
+    """Which legs are alike some that are inhibited."""
+    return legs if AUTO in legs else alike(
+        running.networks[0].system, [LEGS.index(leg) for leg in legs])
+
+
+def _alternatives(running: Running, name: str) -> list[Any]:
+    """All values of a parameter that is a choice; for several at once, one up to all of them."""
+    entry = next(held.__dataclass_fields__[name] for held in running.parameters.sets.values()
+                 if name in held.__dataclass_fields__)
+    choices = entry.metadata['choices']
+    if not isinstance(entry.default, tuple):
+        return list(choices)
+    several = [choice for choice in choices if choice != AUTO]
+    return [*((choice,) for choice in choices), *(
+        some for size in range(2, len(several) + 1) for some in combinations(several, size))]

@@ -1,0 +1,256 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How large votes must be: the common weight from which on some voters stop the network for
+certain, and below which they cannot; the clamp for which a majority does and fewer do not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from math import log
+
+import numpy as np
+
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.contraction.capture import capture_set
+from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium, inhibited_equilibrium
+from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, NONE, inhibited_contraction
+from dmp_cpg_ros.core.contraction.voting import (
+    SPARE,
+    Relieved,
+    different_voters,
+    growth_in,
+    relieved,
+)
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.roots import sign_change
+
+_PRECISION = 1e-4
+_MOST_STEPS = 8
+
+
+@dataclass(frozen=True)
+class MajorityClamp:
+    """Clamp of the voters' weights for which a majority stops the gait and fewer do not.
+
+    Attributes
+    ----------
+    lowest : float
+        Certified: with this α any majority stops the gait [1/s].
+    highest : float
+        Below this α no smaller vote has an equilibrium inside its regions [1/s].
+    majority : int
+        Number of votes that is needed.
+    """
+
+    lowest: float
+    highest: float
+    majority: int
+
+    @property
+    def possible(self) -> bool:
+        """Whether there is a clamp between the two."""
+        return self.lowest < self.highest
+
+
+def rest_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequence[int],
+                   region_radius: float, known: float = np.inf) -> float:
+    """Smallest common α at which the voters' network can rest inside their regions.
+
+    Parameters
+    ----------
+    system : CanonicalSystem
+        Coupled oscillators.
+    omega : float or ndarray (N,)
+        Angular frequencies [rad/s].
+    voters : sequence of int
+        Nodes that vote.
+    region_radius : float
+        r0 of the regions C_i.
+    known : float
+        What is returned where the threshold is not smaller [1/s].
+
+    Returns
+    -------
+    float
+        Found by bisection on the equilibrium [1/s], rounded down to where there is none:
+        necessary for a stop, and tight; infinite when no weight is enough.
+    """
+    rest: InhibitedEquilibrium | None = None
+
+    def room(alpha: float) -> float:
+        nonlocal rest
+        gains = _votes(system, voters, alpha)
+        found = inhibited_equilibrium(system, omega, gains, None if rest is None else rest.state)
+        if found is None or not found.slowest_rate > 0.0:
+            return -np.inf
+        rest = found
+        farthest = float(rest.distance[gains > 0.0].max())
+        return log(region_radius / farthest) if farthest > 0.0 else np.inf
+
+    scale = _scale(system, omega, region_radius)
+    first = min(known, 1.2 * scale / len(voters))
+    if room(first) < 0.0 and first == known:
+        return known
+    if rest is not None:
+        low = _at_the_edge(system, omega, voters, rest, first, region_radius)
+        low /= 1.0 + 0.5 * _PRECISION
+        if low < first and room(low) < 0.0 <= room(low * (1.0 + _PRECISION)):
+            return low
+    return _threshold(room, scale, highest=known)[0]
+
+
+def _at_the_edge(system: CanonicalSystem, omega: float | Array, voters: Sequence[int],
+                 rest: InhibitedEquilibrium, alpha: float, region_radius: float) -> float:
+    """Common α at which the farthest voter rests at the edge of its region, by Newton's method
+    from a rest at another one [1/s]; 0 where it finds none.
+    """
+    x, N = rest.state, system.graph.size
+    node = max(voters, key=lambda voter: float(rest.distance[voter]))
+    for _ in range(_MOST_STEPS):
+        gains = _votes(system, voters, alpha)
+        off = system.target - x
+        field = system.field(x, omega, gains)
+        beyond = off[node] @ off[node] - region_radius**2
+        slope = np.zeros((2 * N + 1, 2 * N + 1))
+        slope[:-1, :-1] = system.jacobian(x, omega, gains)
+        slope[:-1, -1] = (off * (gains > 0.0)[:, None]).ravel()
+        slope[-1, 2 * node:2 * node + 2] = -2.0 * off[node]
+        try:
+            step = np.linalg.solve(slope, np.append(field.ravel(), beyond))
+        except np.linalg.LinAlgError:
+            return 0.0
+        x, change = x - step[:-1].reshape(x.shape), float(step[-1])
+        if not change < alpha:
+            return 0.0
+        alpha -= change
+        if abs(change) < 1e-3 * _PRECISION * alpha:
+            return alpha
+    return 0.0
+
+
+def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequence[int],
+                        region_radius: float, known: float = 0.0) -> float:
+    """Smallest common α for which capture by the voters is proved to hold and to contract.
+
+    Parameters are those of :func:`rest_threshold`, but that ``known`` is returned where the
+    threshold is not larger.
+
+    Returns
+    -------
+    float
+        Sufficient for a stop [1/s]; infinite when no weight is certified.
+    """
+    box = capture_set(system, omega, _votes(system, voters, 1.0), region_radius)
+    needed, growth = float(np.nanmax(box.needed_gain)), growth_in(system, omega, box)
+
+    def together(alpha: float) -> Relieved | None:
+        return relieved(system, replace(box, gains=_votes(system, voters, alpha)), growth,
+                         region_radius)
+
+    def spare(alpha: float) -> float:
+        found = together(alpha)
+        return log(max(alpha / needed, found.spare / (1.0 + SPARE) if found else 0.0))
+
+    def room(alpha: float) -> float:
+        beyond, found = spare(alpha), together(alpha)
+        capture = replace(box, gains=_votes(system, voters, alpha), rate=-np.inf)
+        if beyond >= 0.0 and found is not None and not capture.holds:
+            beyond = found.kept(box.tolerance, region_radius)
+            capture = replace(capture, needed_gain=found.needed)
+        if beyond < 0.0 or inhibited_contraction(system, capture).reach == GLOBAL:
+            return beyond
+        rate = capture_set(system, omega, capture.gains, region_radius, known=box).rate
+        reach = inhibited_contraction(system, replace(capture, rate=rate)).reach
+        return -np.inf if reach == NONE else beyond
+
+    if known > 0.0 and (known == np.inf or room(known) >= 0.0):
+        return known
+    scale = _scale(system, omega, region_radius)
+    low = _threshold(spare, scale, lowest=known)[1]
+    if low == np.inf or (below := room(low)) >= 0.0:
+        return low
+    alone = needed * (1.0 + _PRECISION)
+    if alone > low and (above := room(alone)) >= 0.0:
+        return sign_change(room, low, alone, _PRECISION, (below, above))[1]
+    return _threshold(room, scale, lowest=low)[1]
+
+
+def majority_clamp(system: CanonicalSystem, omega: float, region_radius: float,
+                   majority: int, slowest_omega: float | None = None) -> MajorityClamp:
+    """Clamp for which ``majority`` votes are enough, whoever casts them, and one less is not.
+
+    Parameters
+    ----------
+    system : CanonicalSystem
+        Coupled oscillators.
+    omega : float
+        Largest angular frequency [rad/s]: at it a majority is enough.
+    region_radius : float
+        r0 of the regions C_i.
+    majority : int
+        Number of votes, 1 to N.
+    slowest_omega : float, optional
+        Smallest angular frequency [rad/s]: down to it a smaller vote is not enough; ``omega``
+        without.
+
+    Returns
+    -------
+    MajorityClamp
+
+    Raises
+    ------
+    ParameterError
+        If the number of votes is impossible.
+    """
+    size = system.graph.size
+    if not 1 <= majority <= size:
+        raise ParameterError(f'majority = {majority} must lie between 1 and {size}, the number of '
+                             'oscillators')
+    slowest = omega if slowest_omega is None else slowest_omega
+    return MajorityClamp(
+        enough_for_all(system, omega, different_voters(system, majority), region_radius),
+        too_weak_for_all(system, slowest, different_voters(system, majority - 1), region_radius),
+        majority)
+
+
+def enough_for_all(system: CanonicalSystem, omega: float | Array,
+                   sets: Sequence[Sequence[int]], region_radius: float) -> float:
+    """Largest :func:`certified_threshold` of some sets of voters: each is certified at it."""
+    return reduce(lambda known, voters: certified_threshold(
+        system, omega, voters, region_radius, known), sets, 0.0)
+
+
+def too_weak_for_all(system: CanonicalSystem, omega: float | Array,
+                     sets: Sequence[Sequence[int]], region_radius: float) -> float:
+    """Smallest :func:`rest_threshold` of some sets of voters: none rests at it."""
+    return reduce(lambda known, voters: rest_threshold(
+        system, omega, voters, region_radius, known), sets, np.inf)
+
+
+def _votes(system: CanonicalSystem, voters: Sequence[int], alpha: float) -> Array:
+    gains = np.zeros(system.graph.size)
+    gains[list(voters)] = alpha
+    return gains
+
+
+def _scale(system: CanonicalSystem, omega: float | Array, region_radius: float) -> float:
+    """Order of magnitude of what one node needs to hold all others [1/s]."""
+    omega = np.broadcast_to(np.abs(omega), (system.graph.size,))
+    return float(np.sum(omega * system.radius)) / region_radius + 1e-3
+
+
+def _threshold(room: Callable[[float], float], scale: float, lowest: float = 0.0,
+               highest: float = np.inf) -> tuple[float, float]:
+    """An α at which there is no room (below 0) and one, ``_PRECISION`` higher, at which there is,
+    searched from 1/30 to 1000 times a scale, or from where there is none to where there is.
+    """
+    low, high = max(scale / 30.0, lowest), min(3.0 * max(scale, lowest), highest)
+    while high < highest and room(high) < 0.0:
+        low, high = high, 3.0 * high
+        if high > 1000.0 * scale:
+            return np.inf, np.inf
+    return sign_change(room, low, high, _PRECISION)
