@@ -150,7 +150,7 @@ class CanonicalOscillators(SuiteNode):
         return Acting(  # legs may be caught from when what is armed now acts
             state.cadence_scale,
             (self._canonical.network(state.gait), self._latest, state.x),
-            (*state.gait.ends, state.wanted))
+            (*state.gait.ends, state.wanted), not self.lock_step)
 
     def _watch_phases(self, network: GaitNetwork, r: Any, dt: float) -> None:
         """Compare the phases with their bound; an alarm is published at once."""

@@ -141,3 +141,20 @@ def test_no_parameter_of_what_captures_changes_once_it_is_told_that_legs_may_be_
     assert not gait.canonical._inhibition.gains.any()
     assert 'while the legs are being captured' in refused()
     gait.end()
+
+
+def test_no_coupling_changes_from_when_a_stop_is_heard_of_until_its_arming_is(ros: Ros) -> None:
+    gait = Gait(ros, 8, LATEST, 1e-9 * TICK_NS * 20)
+    for _ in range(200):
+        gait.tick()
+    gait.inhibition._take_request(SetBool.Request(data=True))
+    told = 0
+    while not gait.canonical._latest.gains.any():
+        gait.tick()
+        if not gait.canonical._latest.requested:
+            continue
+        result = gait.canonical.set_parameters([Parameter('coupling_gain', value=90.0)])[0]
+        assert not result.successful and 'while' in result.reason
+        told += gait.inhibition._announced.latest.gains.any()
+    assert told > 0  # it was armed, and not heard of
+    gait.end()
