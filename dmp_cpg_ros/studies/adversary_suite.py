@@ -56,7 +56,7 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
     case : dict
         ``gait``, ``tick_s``, ``parameters`` by name, perhaps ``lead_s`` (``request_lead``), and
         ``events``: lists of a wait [s], a kind (``stop``, ``start``, ``command``, ``set``,
-        ``gait``, ``vote``, ``push``, ``take_over``) and a value.
+        ``gait``, ``vote``, ``push``, ``take_over``, ``leave``, ``forget``) and a value.
     weaken : str
         What is left out, one of ``CONDITIONS``.
     counts : Counter, optional
@@ -129,6 +129,16 @@ def _kept(loop: Oscillators, expected: _Expected, way: float, tick_s: float) -> 
 def _do(loop: Oscillators, kind: str, value: Any, expected: _Expected | None,
         counts: Counter[str]) -> _Expected | None:
     """Do what an event says; what is expected of the stop or the start that is under way."""
+    if kind == 'leave':
+        loop.leave()
+        return None
+    if kind == 'forget':                                     # it may act earlier than predicted
+        loop.forget()
+        return None if expected is None else expected._replace(predicted_s=np.nan)
+    if loop.gone:
+        expected = _promised(loop, loop.take_over)
+        if not loop.stop.requested:
+            expected = None
     if loop.inhibition.requested and not loop.lead_s if kind == 'take_over' else (
             kind == 'stop' and not loop.stop.requested):
         return _promised(loop, loop.take_over if kind == 'take_over' else None)
@@ -141,7 +151,7 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: _Expected | None,
             loop.in_force().certificate().time_to_walking if loop.certified() else np.inf)
         if not news or loop.stop.requested or predicted == np.inf:
             return None
-        return _Expected(loop.now_ns, False, bound, predicted)
+        return _Expected(loop.now_ns, False, bound, np.nan if loop.ahead else predicted)
     if kind == 'command':
         loop.command(*value)
         if expected is not None and not expected.stop:
@@ -169,7 +179,7 @@ def _promised(loop: Oscillators, predict: Callable[[], float] | None = None) -> 
     """What is said of a stop that is requested now or is under way."""
     predicted = predict() if predict is not None else loop.request(True)
     bound = loop.time_to_rest() if loop.certified() else np.inf
-    predicted = min(predicted, LONGEST) if not loop.voted_now else np.nan
+    predicted = np.nan if loop.voted_now or loop.ahead else min(predicted, LONGEST)
     return _Expected(loop.now_ns, True, bound, predicted, loop.stop_distance())
 
 
@@ -292,7 +302,16 @@ def _telling(rng: np.random.Generator, voting: bool, about: int | None = None
         return [entry for _ in range(2) for entry in (
             [2.0, 'vote', _votes(rng)],
             *([4.0 * soon(), *_changing(rng)] for _ in range(3)), [3.0, 'start', None])]
-    kind = rng.integers(6) if about is None else about
+    kind = rng.integers(7) if about is None else about
+    if kind == 6:                                            # who is started again within a lead
+        return [entry for _ in range(3) for entry in (
+            [2.0 + soon(), 'stop', None], [0.1 * soon(), 'forget', None],
+            [0.1 * soon(), str(rng.choice(('leave', 'start', 'forget'))), None],
+            [0.5 * soon(), 'take_over', None], [0.1 * soon(), 'stop', None],
+            [soon(), str(rng.choice(('leave', 'forget'))), None], [soon(), 'take_over', None],
+            [0.1 * soon(), *_changing(rng)], [3.0, 'start', None],
+            [0.1 * soon(), str(rng.choice(('leave', 'forget'))), None],
+            [0.1 * soon(), 'take_over', None])]
     if kind == 0:                                            # stops within starts
         return [entry for _ in range(3) for entry in (
             [2.0, 'stop', None], [2.0, 'start', None], [soon(), 'stop', None],

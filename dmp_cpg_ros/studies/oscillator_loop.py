@@ -51,7 +51,8 @@ class Oscillators(WalkingLoop):
         self._dt, self._weaken, self.now_ns = case['tick_s'], weaken, 0
         self._margins, self._pushed_until_ns = (np.inf,) * 4, 0
         self._voted_ns, self._lead_ns = -1, round(1e9 * case.get('lead_s', 0.0))
-        self._announced = Announced(self.inhibition)
+        self._announced, self.gone = Announced(self.inhibition), False
+        self._early: tuple[int, Inhibition] = (0, self.inhibition)
         nothing = np.full(3, np.nan)
         self._sensors = VoteSensors(0, 0, np.full(4, 0.25), nothing, nothing)
         self._leave_out_places()
@@ -91,8 +92,10 @@ class Oscillators(WalkingLoop):
 
     @property
     def acting(self) -> Inhibition:
-        """Inhibition that acts at the next tick."""
-        return self._announced.at(self.now_ns + self.tick_ns).acting
+        """Inhibition that acts on the oscillators at the next tick."""
+        until_ns, early = self._early
+        next_ns = self.now_ns + self.tick_ns
+        return early if next_ns < until_ns else self._announced.at(next_ns).acting
 
     def time_to_rest(self) -> float:
         """Bound that is stated for a stop that was requested now [s]."""
@@ -123,17 +126,35 @@ class Oscillators(WalkingLoop):
                          self._foreseen, self._dt, self.now_ns)
         return self._described_in(gait)
 
+    def leave(self) -> None:
+        """Let nobody watch the stop: what was told still acts when it was to."""
+        self.gone = True
+
     def take_over(self) -> float:
         """Let another one watch the stop from now on, who knows what acts and no votes; returns
-        the time to rest that it predicts [s].
+        the time to rest that it predicts [s]. Who is away with a request on its way is back after
+        it acts: no process starts within a lead.
         """
+        while self.gone and self._announced.coming:
+            self.advance()
+        self.gone = False
+        if self._lead_ns:
+            self.inhibition = self._announced.acting
         self.stop = adopted(self.inhibition, self.now_ns, self.supervisor.parameters)
+        if self._lead_ns:
+            self.inhibition = self.supervisor.inhibition(self.stop)
         self._announced = Announced(self.inhibition)
         self.votes = self.voting.initial_state(self.network)
         return look_ahead(
             self.supervisor, self.reference, self.canonical, self.stop,
             Announced(self.inhibition), self.canon, self.r,
-            self.gate.foreseen(self.now_ns + self.tick_ns), self._dt).time_s
+            self.gate.foreseen(self.now_ns + self.tick_ns), self._dt, lead_ns=self._lead_ns).time_s
+
+    def forget(self) -> None:
+        """Let the oscillators begin anew, who know where they are: what they hear last acts on
+        them at once, and not when it was to.
+        """
+        self._early = self._announced.latest_ns, self._announced.latest
 
     def vote(self, weights: Mapping[str, float], voter: str = '') -> None:
         """Vote for a stop; no prediction of before the next tick knows of it."""
@@ -150,6 +171,11 @@ class Oscillators(WalkingLoop):
         self._margins = (margin, *self._margins[1:])
         self._pushed_until_ns = self.now_ns + round(duration * 1e9)
 
+    @property
+    def ahead(self) -> bool:
+        """Whether the oscillators do already what was told to act later: no prediction knows."""
+        return self.now_ns < self._early[0]
+
     def advance(self) -> None:
         """Run one tick of what the certificate speaks of."""
         self.now_ns += self.tick_ns
@@ -157,9 +183,13 @@ class Oscillators(WalkingLoop):
         dt, inhibition = self._dt, self._announced.acting
         command = self.gate.at(self.now_ns)
         self.r = self.reference.towards(self.r, command, inhibition, dt)
+        if self.ahead:
+            inhibition = self._early[1]
         if self._weaken == 'places':
             inhibition = _Separate(**vars(inhibition))
         self.canon = canon = self.canonical.step(self.canon, self.r, inhibition, dt)
+        if self.gone:
+            return
         self.votes = self.voting.step(
             self.votes, self.now_ns, self.network, self._sensors, canon.x, self.r,
             self.stop.state in ('walking', 'free'), self.inbox.take(self.votes.memory.asks))

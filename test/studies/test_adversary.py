@@ -167,3 +167,22 @@ def test_the_command_counts_what_it_tried(capsys: pytest.CaptureFixture[str],
     assert main(['--seconds', '60', '--weaken', 'capture', '--failures', '1']) == 1
     told = capsys.readouterr().out
     assert told.startswith('| 0 | 1 x 60 s | capture |') and 'happened: leaves C' in told
+
+
+@pytest.mark.parametrize('kind', ['leave', 'forget'])
+@pytest.mark.parametrize('wait', [0.0, 0.012, 0.1])
+def test_who_is_started_again_within_a_lead_carries_out_what_was_told(
+        kind: str, wait: float) -> None:
+    told = case({}, (0.1, 'start', None), (0.0, 'command', [1.0, 0.0, 0.0]), (2.0, 'stop', None),
+                (wait, kind, None), (0.008, 'take_over', None), (0.0, 'command', [2.0, 0.0, 0.0])
+                ) | {'lead_s': 0.06}
+    assert play(ROBOT, told)[0] == ''
+    loop = Oscillators(ROBOT, told)
+    loop.request(False)
+    for _ in range(500):
+        loop.advance()
+    loop.request(True)
+    loop.leave()
+    loop.advance()
+    loop.take_over()
+    assert loop.stop.requested and loop.acting.requested
