@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.primitive_files import load_motion
 from dmp_cpg_ros.strict_yaml import load_yaml, naming
-from dmp_cpg_ros.suite_table import KINDS, LEG, ROBOT, WALKING
+from dmp_cpg_ros.suite_table import KINDS, LEG, RETURN_S, ROBOT, WALKING
 
 DEFAULT_FILE = 'suite.yaml'
 """Parameter file of the package, in the config folder."""
@@ -218,6 +218,33 @@ def node_sets(path: Path, kind: str, overrides: Mapping[str, Any] | None = None,
         except DmpCpgError as error:
             raise ParameterError(f"'{path}', {node}: {error}") from error
     return sets
+
+
+def return_times(path: Path, nodes: Iterable[str], respawn: bool, namespace: str = ''
+                 ) -> dict[str, float]:
+    """``return_time`` of nodes, for those that do not have their own default [s].
+
+    Parameters
+    ----------
+    path : Path
+        Parameter file, which is asked first.
+    nodes : iterable of str
+        Names of the nodes.
+    respawn : bool
+        Whether nodes that die are started again: ``RETURN_S`` then, where the file says nothing.
+    namespace : str
+        Namespace of the nodes.
+
+    Raises
+    ------
+    DataError
+        If the file has no section for a node.
+    """
+    content, name = load_yaml(path), 'return_time'
+    given = {node: node_parameters(content, f'{namespace.rstrip("/")}/{node}', path)
+             for node in nodes}
+    return {node: values.get(name, RETURN_S) for node, values in given.items()
+            if respawn or name in values}
 
 
 SUITE_NAMES = frozenset(field.name for kind in WALKING for cls in kind.sets

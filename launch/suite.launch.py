@@ -15,13 +15,12 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from dmp_cpg_ros.robot.urdf import urdf
-from dmp_cpg_ros.suite import load_suite
+from dmp_cpg_ros.suite import load_suite, return_times
 from dmp_cpg_ros.suite_table import (
     COMPOSED,
     PROCESSES,
     RECORDED_WALK,
     RECORDER,
-    RETURN_S,
     ROBOT,
     VISUALIZATION,
     instances,
@@ -57,6 +56,10 @@ def generate_launch_description() -> LaunchDescription:
             description='whether to start nodes again that end before their time, all but the '
                         'robot'),
         DeclareLaunchArgument(
+            'return_time', default_value='',
+            description='how much longer the gait goes on without a node that may come back [s]; '
+                        'if empty, as the parameters say, else what respawn needs'),
+        DeclareLaunchArgument(
             'record', default_value='false', choices=['true', 'false'],
             description='whether to record all topics of the suite in a bag'),
         DeclareLaunchArgument(
@@ -86,8 +89,8 @@ def nodes(context: LaunchContext) -> list[Node]:
     shared = {name: str(suite.robot_file) for name in robot}
     if given['lock_step']:
         shared['lock_step'] = given['lock_step'] == 'true'
-    if given['respawn'] == 'true':
-        shared['return_time'] = RETURN_S
+    if given['return_time']:
+        shared['return_time'] = float(given['return_time'])
     recording = given['record'] == 'true'
     if recording:
         shared['expected_nodes'] = list(RECORDED_WALK)
@@ -97,7 +100,11 @@ def nodes(context: LaunchContext) -> list[Node]:
     if given[FRAMES] == 'true' or (
             given[FRAMES] == 'auto' and FRAMES in get_packages_with_prefixes()):
         described.append(frames_of(suite.robot_file, namespace))
-    table = {name: (kind.name, own) for kind, name, own in instances()}
+    table = {name: (kind.name, dict(own)) for kind, name, own in instances()}
+    if given['respawn'] == 'true' and not given['return_time']:
+        ticking = [name for name, (kind, _) in table.items() if kind != RECORDER]
+        for name, seconds in return_times(suite.file, ticking, True, namespace).items():
+            table[name][1]['return_time'] = seconds
     looking_on = [name for name, wanted in (
         (RECORDER, recording), (VISUALIZATION, given[VISUALIZATION] == 'true')) if wanted]
     for process, names in {**{name: (name,) for name in looking_on},

@@ -32,15 +32,8 @@ from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.core.suite_parameters import REFERENCE
 from dmp_cpg_ros.primitive_files import motion_overrides
 from dmp_cpg_ros.strict_yaml import load_yaml, naming
-from dmp_cpg_ros.suite import Suite, load_suite
-from dmp_cpg_ros.suite_table import (
-    KINDS,
-    RECORDED_WALK,
-    RECORDER,
-    RETURN_S,
-    WALKING,
-    namespace_rules,
-)
+from dmp_cpg_ros.suite import Suite, load_suite, return_times
+from dmp_cpg_ros.suite_table import KINDS, RECORDED_WALK, RECORDER, WALKING, namespace_rules
 
 if TYPE_CHECKING:
     from dmp_cpg_ros.commands.fork_server import ForkServer
@@ -223,8 +216,10 @@ def _run(plan: _Plan, folder: Path, server: ForkServer) -> tuple[int, list[str]]
     resolved = plan.resolved(gated=True)
     for values in resolved.values():
         values.update(lock_step=options.lock_step, expected_nodes=list(RECORDED_WALK))
-        if options.respawn and not options.lock_step:
-            values.setdefault('return_time', RETURN_S)
+    returns = return_times(plan.suite.file, resolved, options.respawn and not options.lock_step,
+                           ros.namespace)
+    for name, seconds in returns.items():
+        resolved[name]['return_time'] = seconds
     stamped = resolved[REFERENCE]['stamped_cmd_vel']
     resolved[RECORDER] = {'output': str(folder / 'bag'), 'stamped_cmd_vel': stamped,
                           'expected_nodes': [kind.name for kind in WALKING]}

@@ -30,6 +30,7 @@ from dmp_cpg_ros.suite_table import (
     ABSOLUTE_TOPICS,
     KINDS,
     RECORDER,
+    RETURN_S,
     ROBOT,
     VISUALIZATION,
     WALKING_NODES,
@@ -38,7 +39,7 @@ from dmp_cpg_ros.suite_table import (
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
 
 ARGUMENTS = {'parameters': '', 'robot': '', 'lock_step': '', 'namespace': '', 'record': 'false',
-             'processes': 'each', 'bag': 'bag', 'respawn': 'false',
+             'processes': 'each', 'bag': 'bag', 'respawn': 'false', 'return_time': '',
              'robot_state_publisher': 'auto', 'visualization': 'false'}
 
 UP_S = 90.0
@@ -99,6 +100,40 @@ def test_all_but_the_robot_come_back_where_that_is_asked_for(described: Describe
             *others, robot = described(given)
             assert {node.respawn for node in others} == {respawn == 'true'}
             assert robot.on_exit is not None and not robot.respawn
+
+
+def return_times(described: list[Any]) -> dict[str, float]:
+    """What of the launch file's own values overrides the file's ``return_time``, by node."""
+    told: dict[str, float] = {}
+    for node in described:
+        names = getattr(node, 'arguments', [getattr(node, 'name', '')])
+        own = node.parameters[1] if len(node.parameters) > 1 else {}
+        told.update(dict.fromkeys(names, own['return_time']) if 'return_time' in own else {})
+        told.update((word.partition(':')[0], float(word.rpartition(':=')[2]))
+                    for word in getattr(node, 'ros_arguments', []) if ':return_time:=' in word)
+    return told
+
+
+@pytest.mark.parametrize('shared', ['each', 'blocks', 'composed'])
+def test_the_return_time_is_the_files_unless_the_argument_is_given(
+        described: Described, tmp_path: Path, shared: str) -> None:
+    given = {**ARGUMENTS, 'processes': shared}
+    assert return_times(described(given)) == {}
+    given['respawn'] = 'true'
+    assert return_times(described(given)) == dict.fromkeys(WALKING_NODES, RETURN_S)
+    file = tmp_path / 'mine.yaml'
+    of_one = {'/**': {'ros__parameters': {'gait': 'trot'}},
+              f'/**/{ROBOT}': {'ros__parameters': {'return_time': 0.25}}}
+    file.write_text(yaml.dump(of_one), encoding='utf-8')
+    given['parameters'] = str(file)
+    assert return_times(described(given)) == {
+        **dict.fromkeys(WALKING_NODES, RETURN_S), ROBOT: 0.25}
+    file.write_text(yaml.dump({'/**': {'ros__parameters': {'return_time': 0.4}}}),
+                    encoding='utf-8')
+    assert return_times(described(given)) == dict.fromkeys(WALKING_NODES, 0.4)
+    for respawn in ('true', 'false'):
+        asked = {**given, 'return_time': '0.6', 'respawn': respawn}
+        assert return_times(described(asked)) == dict.fromkeys(WALKING_NODES, 0.6)
 
 
 @pytest.mark.parametrize(('lock_step', 'namespace', 'shared'), [

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Folders of runs that begin at the same time."""
+"""Folders of runs: those that begin at the same time, and the parameters that a run is given."""
 
 from __future__ import annotations
 
@@ -9,8 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
+from dmp_cpg_ros.commands import walk
 from dmp_cpg_ros.commands.run_folder import make_run_folder
+from dmp_cpg_ros.strict_yaml import load_yaml
+from dmp_cpg_ros.suite_table import RETURN_S, ROBOT, WALKING_NODES
 
 
 def test_walks_that_begin_at_once_have_folders_of_their_own_and_latest_is_always_there(
@@ -33,3 +37,20 @@ def test_walks_that_begin_at_once_have_folders_of_their_own_and_latest_is_always
     assert len({first, second, *forestalled}) == 3
     assert (tmp_path / 'runs' / 'latest').resolve() == second
     assert len(list((tmp_path / 'runs').iterdir())) == 4
+
+
+@pytest.mark.parametrize('options', [(), ('--respawn',), ('--respawn', '--lock-step')])
+def test_the_return_time_of_the_parameter_file_wins(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...]) -> None:
+    monkeypatch.setattr('dmp_cpg_ros.commands.suite_run.run_suite', lambda *_, **__: (True, []))
+    usual = {'/**': {'ros__parameters': {'gait': 'amble'}}}
+    own = {f'/**/{ROBOT}': {'ros__parameters': {'return_time': 0.25}}}
+    for number, content in enumerate((usual, usual | own)):
+        file, folder = tmp_path / f'{number}.yaml', tmp_path / f'run_{number}'
+        file.write_text(yaml.dump(content), encoding='utf-8')
+        assert walk.main(['--parameters', str(file), '--out', str(folder), *options]) == 0
+        written = load_yaml(folder / 'parameters.yaml')
+        told = {name: values['return_time'] for name in WALKING_NODES if 'return_time' in (
+            values := written[f'/**/{name}']['ros__parameters'])}
+        expected = dict.fromkeys(WALKING_NODES, RETURN_S) if options == ('--respawn',) else {}
+        assert told == expected | ({ROBOT: 0.25} if number else {})
