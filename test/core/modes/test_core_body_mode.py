@@ -224,6 +224,50 @@ def test_the_detector_keeps_its_delays() -> None:
     assert (k - 1) * TICK == pytest.approx(0.2)
 
 
+@pytest.mark.parametrize(('load', 'fallen'), [
+    ((0.0, 0.0), True), ((0.3, 5.0), True), ((0.4, 0.2), True), ((0.0, 0.9), False),
+    ((0.7, 0.0), False), ((1.0, -2.0), False)])
+def test_without_imu_a_robot_falls_whose_feet_do_not_carry_it(
+        load: tuple[float, float], fallen: bool) -> None:
+    blind = replace(UPRIGHT, load=load)
+    for machine in (Machine().go(0.5), Machine('lying', fall_support=0.08)):
+        stands = machine.state.mode == 'standing'
+        machine.go(1.0, blind)
+        assert (machine.state.mode == 'damped') == (fallen and stands)
+    assert Machine(fall_support=0.0).go(2.0, blind).state.mode == 'standing'
+
+
+def test_flight_without_imu_is_no_fall_but_an_imu_now_and_then_does_not_hide_one() -> None:
+    weightless, landed = replace(UPRIGHT, load=(0.0, 0.0)), replace(UPRIGHT, load=(1.6, 1.6))
+    machine = Machine().go(0.5)
+    for _ in range(10):
+        machine.go(0.15, weightless).go(0.25, landed)
+    assert machine.state.mode == 'standing'
+    for _ in range(25):
+        machine.go(0.036, weightless).go(TICK)
+    assert machine.state.mode == 'damped' and 'no IMU' in machine.state.reason
+
+
+def test_what_was_carried_without_imu_is_forgotten_once_it_is_believed() -> None:
+    machine = Machine().go(0.5).go(0.15, replace(UPRIGHT, load=(0.0, 0.0)))
+    assert machine.state.fall.load[0] < 1.0
+    assert machine.go(3.0).state.fall == FallState()
+
+
+def test_load_is_what_feet_and_torques_tell_where_there_is_no_imu() -> None:
+    sound, nothing = standing_state(ROBOT), np.full(3, np.nan)
+    weight = ROBOT.mass * GRAVITY
+    sense, quarters = BodySense(ROBOT), np.full(4, 0.25 * weight)
+    assert sense.condition(sound).load is None
+    blind = replace(sound, gyro_in_base=nothing, foot_force=quarters,
+                    joint_effort=sense.carrying_torque(sound, 0.9))
+    assert sense.condition(blind).load == pytest.approx((1.0, 0.9), rel=0.02)
+    one = replace(blind, foot_force=np.array((np.nan, 0.0, 0.0, 0.0)))
+    assert sense.condition(one).load == pytest.approx((0.25, 0.9), rel=0.02)
+    assert sense.condition(replace(blind, felt_legs=(False,) * 4)).load is None
+    assert sense.condition(replace(blind, felt_legs=(True, *(False,) * 3))).load is not None
+
+
 def test_a_fall_is_found_on_a_clock_that_is_set_back() -> None:
     machine = Machine()
     machine.time_ns = 1_000_000_000_000
