@@ -67,7 +67,7 @@ class BodyCondition:
         Height of ``base_link`` over the sole of the lowest foot [m].
     support : float
         Share of the weight that the feet carry, by the contact sensors, or by the joint torques
-        where these say more and the sensors little.
+        where these say more and the sensors little, or nothing.
     load : tuple of float, optional
         Where the IMU is not believed, but legs are felt: share of the weight that the feet carry
         by the contact sensors, of which one that tells nothing is taken to tell a quarter, and by
@@ -107,7 +107,8 @@ class BodySense:
         legs, down = self._legs.at(state.joint_position.tolist()), np.array(towards)
         for (foot, _), radius in zip(legs, self._radius, strict=True):
             height = max(height, dot(towards, foot) + radius)
-        support = sum(state.foot_force.tolist()) / self._weight
+        support = sum(force for force in state.foot_force.tolist() if force == force)  # no NaN
+        support /= self._weight
         if support < CERTAIN_SUPPORT:
             support = max(support, self._pressed(state, down))
         load = None

@@ -301,9 +301,11 @@ def test_tilt_and_down_are_those_of_the_orientation(angle: float) -> None:
         condition.down_in_base, (0.0, -math.sin(angle), -math.cos(angle)), atol=1e-12)
 
 
-def test_height_is_over_the_lowest_sole_and_support_is_what_the_torques_press() -> None:
+@pytest.mark.parametrize('contacts', [0.0, np.nan])
+def test_height_is_over_the_lowest_sole_and_support_is_what_the_torques_press(
+        contacts: float) -> None:
     sense = BodySense(ROBOT)
-    state = replace(standing_state(ROBOT), foot_force=np.zeros(4))
+    state = replace(standing_state(ROBOT), foot_force=np.full(4, contacts))
     for share in (0.0, 0.4, 1.0):
         carried = replace(state, joint_effort=sense.carrying_torque(state, share))
         condition = sense.condition(carried)
