@@ -90,8 +90,9 @@ def matrices(of: Any, shift: F) -> list[Polynomial]:
 
 def moduli(polynomials: list[Polynomial], w: F) -> list[Any]:
     """Bounds of the moduli of all entries a - i b w' - c w'^2 + i d w'^3, |w'| <= w."""
-    return [[[root((a * a + w**2 * (max(b * b - 2 * a * c, 0) + w**2 * (max(
-        c * c - 2 * b * d, 0) + w**2 * d * d))) / F(ONE**2)) for a, b, c, d in zip(
+    n, m = (w * w).as_integer_ratio()
+    return [[[root(F(m**3 * a * a + n * (m * m * max(b * b - 2 * a * c, 0) + n * (m * max(
+        c * c - 2 * b * d, 0) + n * d * d)), m**3 * ONE**2)) for a, b, c, d in zip(
             *rows, strict=True)] for rows in zip(*of.d, strict=True)] for of in polynomials]
 
 
