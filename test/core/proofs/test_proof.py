@@ -14,6 +14,7 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from itertools import count, islice
 from pathlib import Path
 from types import ModuleType
@@ -51,9 +52,23 @@ def running(gait: GaitNetwork, inhibition: InhibitionParameters = P.inhibition,
 def proof(gait: GaitNetwork, inhibition: InhibitionParameters = P.inhibition,
           tick: float = TICK) -> dict[str, Any]:
     """As it stands in a file."""
-    found: dict[str, Any] = json.loads(json.dumps(
-        proof_of(running(gait, inhibition, tick)), allow_nan=False))
+    found: dict[str, Any] = json.loads(text(gait, inhibition, tick))
     return found
+
+
+def text(gait: GaitNetwork, inhibition: InhibitionParameters, tick: float) -> str:
+    return json.dumps(proof_of(running(gait, inhibition, tick)), allow_nan=False)
+
+
+def usual_proof(gait: str = 'amble', tick: float = TICK) -> dict[str, Any]:
+    """That of a gait with the usual parameters, which many tests read and change."""
+    found: dict[str, Any] = json.loads(usual_text(gait, tick))
+    return found
+
+
+@cache
+def usual_text(gait: str, tick: float) -> str:
+    return text(network(gait), P.inhibition, tick)
 
 
 REGIONAL = (901, 1704, 3450, 3472, 4154, 6203)
@@ -85,9 +100,16 @@ def settings(seeds: Iterable[int], share: tuple[float, float]
             yield gait, inhibition, tick, certificate
 
 
+@cache
+def proved() -> list[tuple[GaitNetwork, InhibitionParameters, float, Certificate, str]]:
+    """Thirty of these settings with much coupling, and their proofs."""
+    return [(*setting, text(*setting[:3])) for setting in islice(
+        settings(count(), (5.0, 100.0)), 30)]
+
+
 @pytest.mark.parametrize('gait', GAITS)
 def test_every_gait_has_a_proof_of_every_inequality(gait: str) -> None:
-    found = check_rest.check(proof(network(gait)))
+    found = check_rest.check(usual_proof(gait))
     certificate = certify(running(network(gait)))
     assert set(found) == {
         f'step_{row.name}' if row.name == 'time_to_rest' else row.name
@@ -100,9 +122,9 @@ def test_every_gait_has_a_proof_of_every_inequality(gait: str) -> None:
 
 
 def test_random_certified_settings_have_proofs() -> None:
-    cases = settings(count(), (5.0, 100.0))
-    for _, (gait, inhibition, tick, _) in zip(range(30), cases, strict=False):
-        check_proof.check(proof(gait, inhibition, tick))
+    assert len(proved()) == 30
+    for *_, found in proved():
+        check_proof.check(json.loads(found))
 
 
 def test_settings_that_contract_on_a_region_alone_have_proofs() -> None:
@@ -191,7 +213,7 @@ def mutated(found: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
 def test_mutated_proofs_are_refused() -> None:
     rng = np.random.default_rng(3)
     regional = next(settings(REGIONAL, (1.5, 5.0)))
-    originals = [proof(network()), proof(network('trot', coupling_graph='directed_ring')),
+    originals = [usual_proof(), proof(network('trot', coupling_graph='directed_ring')),
                  proof(*regional[:3])]
     for original in originals:
         checkers = [check_proof, *[check_step] * bool(original['step']),
@@ -208,7 +230,7 @@ def test_mutated_proofs_are_refused() -> None:
     ('coupling_gain', None), ('inhibition', None), ('omega_max', '40'), ('tick', '1/5')])
 def test_a_proof_is_not_accepted_for_parameters_that_are_worse(name: str, value: str | None
                                                                ) -> None:
-    changed = proof(network())
+    changed = usual_proof()
     p = changed['parameters']
     if name == 'coupling_gain':
         p['coupling'] = [[str(Fraction(k) / 100) for k in row] for row in p['coupling']]
@@ -225,7 +247,7 @@ def test_a_proof_is_not_accepted_for_parameters_that_are_worse(name: str, value:
 def test_the_step_of_every_gait_has_a_proof_that_says_what_certify_does(gait: str, tick: float
                                                                         ) -> None:
     certificate = certify(running(network(gait), tick=tick))
-    found = check_rest.check(proof(network(gait), tick=tick))
+    found = check_rest.check(usual_proof(gait, tick))
     assert {'step_premises', *STEP_ROWS} < set(found) and certificate['step_capture'].required
     bound, longest = found['step_time_to_rest']
     assert longest == 10 and 0.98 * certificate.time_to_rest < float(bound) <= 1.0001 * (
@@ -240,8 +262,8 @@ def test_the_step_of_every_gait_has_a_proof_that_says_what_certify_does(gait: st
 
 def test_proved_times_to_rest_are_never_far_above_those_that_are_stated() -> None:
     shares = []
-    for gait, inhibition, tick, certificate in islice(settings(count(), (5.0, 100.0)), 20):
-        found = proof(gait, inhibition, tick)
+    for *_, certificate, text_of_it in proved()[:20]:
+        found = json.loads(text_of_it)
         if found['rest']:
             shares.append(float(check_rest.check(found)['step_time_to_rest'][0])
                           / certificate.time_to_rest)
@@ -253,8 +275,8 @@ def test_proved_times_to_rest_are_never_far_above_those_that_are_stated() -> Non
     ('armed_speed', Fraction(1, 9)), ('omega_armed_min', Fraction(1, 4)), ('foot_speed', 40)])
 def test_a_time_to_rest_is_not_accepted_for_parameters_that_make_it_longer(
         name: str, worse: Fraction) -> None:
-    found = proof(network())
-    stated = check_rest.check(found)['step_time_to_rest'][0]
+    found = usual_proof()
+    stated = Fraction(found['rest']['step_time_to_rest'][0])
     p, w, s = (check_proof.read(of) for of in (
         found['parameters'], found['witnesses'], found['step']['witnesses']))
     p[name] *= worse
@@ -272,8 +294,8 @@ def test_steps_from_the_box_keep_the_bounds_that_a_time_to_rest_is_made_of() -> 
     """Of what is moved, of rates and of another frequency; halved, each of them fails."""
     rng = np.random.default_rng(4)
     close = np.zeros(4)
-    for gait, inhibition, tick, _ in islice(settings(count(), (5.0, 100.0)), 6):
-        found = proof(gait, inhibition, tick)
+    for *_, text_of_it in proved()[:6]:
+        found = json.loads(text_of_it)
         if not found['rest']:
             continue
         p, s = (check_proof.read(of) for of in (found['parameters'], found['step']['witnesses']))
@@ -314,7 +336,7 @@ def test_a_step_that_synchronises_slowly_while_it_turns_fast_has_a_proof() -> No
 def test_a_norm_is_refused_that_any_frequency_exceeds() -> None:
     rng = np.random.default_rng(2)
     for shift in (0.0, 0.01):
-        p = check_proof.read(proof(network())['parameters'])
+        p = check_proof.read(usual_proof()['parameters'])
         weights = rng.dirichlet(np.full(4, 4.0))
         xi = [Fraction(x) for x in weights.tolist()]
         xi[0] += 1 - sum(xi)
@@ -348,7 +370,7 @@ def test_a_setting_whose_step_is_not_proved_has_a_proof_without_it() -> None:
     ('omega_max', 3), ('tick', Fraction(5, 4)), ('rho', 3), ('region_radius', Fraction(1, 2))])
 def test_a_proof_of_the_step_is_not_accepted_for_parameters_that_are_worse(
         name: str, worse: Fraction) -> None:
-    changed = proof(network())
+    changed = usual_proof()
     changed['parameters'][name] = str(Fraction(changed['parameters'][name]) * worse)
     with pytest.raises(ValueError):
         check_step.check(changed)
@@ -389,7 +411,7 @@ def test_a_checker_is_a_script_of_its_own(checker: ModuleType, tmp_path: Path) -
     for each in CHECKERS:                            # beside each other, and nothing else
         (tmp_path / Path(str(each.__file__)).name).write_bytes(
             Path(str(each.__file__)).read_bytes())
-    found = proof(network())
+    found = usual_proof()
     path.write_text(json.dumps(found), encoding='utf-8')
 
     def status(arguments: Sequence[str] = (str(path),)) -> int:
