@@ -13,6 +13,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+import parsed_once  # noqa: F401
 import pytest
 from hypothesis import settings
 

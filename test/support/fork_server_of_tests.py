@@ -3,12 +3,13 @@
 """Fork server of the tests, which start hundreds of commands, each walk in a domain of its own.
 
 Run as a program it is that server. It has imported what commands need after a walk and beside it,
-too, and its walks look for others in the graph for as long as discovery takes on one machine.
+too, and has read the suite's parameters; its walks look for others in the graph for as long as
+discovery takes on one machine.
 """
 
 from __future__ import annotations
 
-import sys
+import parsed_once  # noqa: F401
 
 from dmp_cpg_ros.commands import (  # noqa: F401
     analyze,
@@ -17,6 +18,7 @@ from dmp_cpg_ros.commands import (  # noqa: F401
     robot_client,
     suite_domain,
 )
+from dmp_cpg_ros.suite import load_suite
 
 LOOK_S = 0.2
 
@@ -28,4 +30,5 @@ class TestServer(fork_server.ForkServer):
 
 if __name__ == '__main__':
     suite_domain.LOOK_S = LOOK_S
-    sys.exit(fork_server.main())
+    load_suite()
+    fork_server.end(fork_server.main())
