@@ -32,14 +32,19 @@ from dmp_cpg_ros.suite_table import PROCESSES, ROBOT
 processes, ros, ros_domain = (
     ros_processes.processes, ros_processes.ros, ros_processes.ros_domain)
 
-IMPATIENT = """
+PROGRAM = """
 import sys
 from dmp_cpg_ros.commands import suite_run, suite_watch
-suite_watch.LAST_WORDS_S = suite_run.ENDED_WITHIN_S = 1.5
+{}
 from dmp_cpg_ros.__main__ import walk
 sys.exit(walk())
 """
+
+IMPATIENT = PROGRAM.format('suite_watch.LAST_WORDS_S = suite_run.ENDED_WITHIN_S = 1.5')
 """Program of a ``walk`` that waits for a node that hangs for 1.5 s, instead of 10 and 15."""
+
+WATCHFUL = PROGRAM.format('suite_watch.FIRST_WORD_S = 1.0')
+"""Program of a ``walk`` that finds waiting of 1 s worth a word, instead of 3."""
 
 AGAIN = 'all nodes are ready again'
 
@@ -178,9 +183,10 @@ def test_a_node_that_stands_still_for_a_while_is_followed_again(
 def test_in_lock_step_no_tick_is_told_again_because_the_robot_looks_after_itself_for_long(
         processes: Processes, tmp_path: Path) -> None:
     """How long is wall time, of which the published bytes tell nothing."""
-    failure = {'at': 1.0, 'fail': {'component': 'link', 'kind': 'off', 'for_s': 9.0, 'leg': 'rl'}}
-    process = walk(processes, tmp_path, 11.0, '--lock-step', '--composed', '--no-report', '--set',
-                   'failures_allowed:=true', events=[failure])
+    failure = {'at': 1.0, 'fail': {'component': 'link', 'kind': 'off', 'for_s': 7.0, 'leg': 'rl'}}
+    process = processes.python(
+        '-c', WATCHFUL, str(scenario(tmp_path, 9.0, [failure])), '--no-report', '--out',
+        str(tmp_path / 'run'), *LOCK_STEP, '--composed', '--set', 'failures_allowed:=true')
     assert process.wait(RUN_S) == 0, str(process)
     for kind in ('looks after itself: stand', 'follows its legs again'):
         assert f'  the robot {kind}' in process.output
