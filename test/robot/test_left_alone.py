@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from functools import cache
 from itertools import product
 from math import pi, tau
 
@@ -82,11 +83,25 @@ class Walk:
         assert np.linalg.norm(state.base_velocity_in_base) < 0.05
         return tilt
 
+    def copy(self) -> Walk:
+        """A walk that goes on as this one does."""
+        return deepcopy(self, {id(self.robot.model): self.robot.model})
+
+
+def walking(gait: str, speed: float, return_ns: int = 0) -> Walk:
+    """A robot that has walked for three seconds."""
+    return walked(gait, speed, return_ns).copy()
+
+
+@cache
+def walked(gait: str, speed: float, return_ns: int) -> Walk:
+    return Walk(gait, speed, return_ns).go(750)
+
 
 @pytest.mark.parametrize(('gait', 'speed'), [
     ('amble', 0.3), ('amble', 0.5), ('amble', 0.8), ('trot', 0.5), ('trot', 1.0), ('trot', 1.5)])
 def test_silent_in_any_phase_it_comes_to_a_stand(gait: str, speed: float) -> None:
-    walk = Walk(gait, speed).go(750)
+    walk = walking(gait, speed)
     tilts: list[float] = []
     while len(tilts) < PHASES:
         wanted, before = tau * len(tilts) / PHASES, walk.phase
@@ -108,7 +123,7 @@ def test_silent_while_it_speeds_up_it_puts_its_feet_down(gait: str, speed: float
 @pytest.mark.parametrize('silent', ['fl', 'fl fr rl rr'])
 def test_legs_that_are_back_in_time_are_followed_without_a_stop(
         gait: str, speed: float, silent: str) -> None:
-    walk = Walk(gait, speed, RETURN_NS).go(750)
+    walk = walking(gait, speed, RETURN_NS)
     for ticks in (60, 120, 170, 220):  # up to 0.88 s, in another phase each time
         walk.go(ticks, silent)
         assert not walk.guard.fallback
@@ -122,7 +137,7 @@ def test_legs_that_are_back_in_time_are_followed_without_a_stop(
 
 
 def test_legs_that_are_not_back_in_time_are_waited_for_no_longer() -> None:
-    walk = Walk('trot', 1.0, RETURN_NS).go(750)
+    walk = walking('trot', 1.0, RETURN_NS)
     last_ns = walk.state.time_ns
     while not walk.guard.fallback:
         walk.go(1, 'fl')
@@ -132,7 +147,7 @@ def test_legs_that_are_not_back_in_time_are_waited_for_no_longer() -> None:
 
 def test_legs_that_come_back_elsewhere_in_the_gait_are_not_followed() -> None:
     """Else the feet of a robot in motion would stop below it."""
-    walk = Walk('trot', 1.0, RETURN_NS).go(750).go(150, 'fl fr rl rr')
+    walk = walking('trot', 1.0, RETURN_NS).go(150, 'fl fr rl rr')
     home = home_joint_position(walk.robot.description)
     for _ in range(120):
         assert walk.guard.fallback == 'stand' or not walk.guard.silent(walk.state.time_ns)
@@ -150,8 +165,8 @@ def test_legs_that_come_back_elsewhere_in_the_gait_are_not_followed() -> None:
 def test_legs_that_were_late_for_a_moment_and_are_elsewhere_then_are_not_followed(
         gait: str, speed: float, away: int) -> None:
     """Feet that stand would be told to swing, as fast as a foot does that nothing holds."""
-    walk = Walk(gait, speed).go(750)
-    ahead = deepcopy(walk, {id(walk.robot.model): walk.robot.model}).go(away)
+    walk = walking(gait, speed)
+    ahead = walk.copy().go(away)
     for tick in range(200):
         ahead.go(1)
         for leg, targets in ahead.targets.by_leg().items():
@@ -163,7 +178,7 @@ def test_legs_that_were_late_for_a_moment_and_are_elsewhere_then_are_not_followe
 
 
 def test_it_follows_the_legs_again_once_they_are_at_rest() -> None:
-    walk = Walk('amble', 0.5).go(750).go(100, silent='fl')
+    walk = walking('amble', 0.5).go(100, silent='fl')
     assert walk.guard.fallback == 'stand'
     walk.go(300)
     assert walk.guard.fallback == 'stand'  # the legs still walk, the robot stands
@@ -183,7 +198,7 @@ def test_it_follows_the_legs_again_once_they_are_at_rest() -> None:
 
 def test_it_follows_legs_that_rest_on_footholds_a_step_away() -> None:
     """Inhibited legs stay on their footholds, and the robot stands on others by itself."""
-    walk = Walk('amble', 0.5).go(750).go(320, silent='fl')  # after which it stands
+    walk = walking('amble', 0.5).go(320, silent='fl')  # after which it stands
     assert walk.guard.fallback == 'stand'
     description = walk.robot.description
     for leg, shift in product(LEGS, ((0.1, 0.0), (-0.1, 0.0), (0.05, 0.05), (0.05, -0.05))):
