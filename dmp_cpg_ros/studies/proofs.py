@@ -167,16 +167,24 @@ def verdict(text: str, kind: str, other: str, rng: np.random.Generator) -> str:
         if not accepted(changed):
             return REFUSED
         return WRONG if refuted(*parts(changed)) else TRUE
+    found = lie(text, kind, rng)
+    if found is None:
+        return SAME
+    changed, false = found
+    taken = accepted(changed)
+    return (WRONG if taken else REFUSED) if false else TRUE if taken else CAREFUL
+
+
+def lie(text: str, kind: str, rng: np.random.Generator) -> tuple[str, bool] | None:
+    """Forge a proof; also tells whether a claim of it is refuted. None where it has no step."""
     if kind in STEP_FORGERIES:
         if not json.loads(text)['step']:
-            return SAME
+            return None
         changed = forged_step(text, kind, rng)
-        false, taken = refuted_step(changed, rng), accepted(changed)
-        return (WRONG if taken else REFUSED) if false else TRUE if taken else CAREFUL
+        return changed, bool(refuted_step(changed, rng))
     p, w = parts(text)
     changed, w = forged(p, w, json.loads(text)['rows'], kind, rng)
-    false, taken = refuted(p, w), accepted(changed)
-    return (WRONG if taken else REFUSED) if false else TRUE if taken else CAREFUL
+    return changed, bool(refuted(p, w))
 
 
 if __name__ == '__main__':
