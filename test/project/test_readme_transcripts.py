@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import sys
@@ -15,7 +16,14 @@ import pytest
 pytest.importorskip('rclpy')
 
 from checkout import setup_constant
-from ros_processes import SHARED_HZ, NodeProcess, Processes, Ros, reserved_domain
+from ros_processes import (
+    SHARED_HZ,
+    NodeProcess,
+    Processes,
+    Ros,
+    fork_server,
+    reserved_domain,
+)
 from test_readme import TRANSCRIPTS, as_shown, files, transcript
 
 from dmp_cpg_ros.nodes.framework.middleware import prepare_middleware
@@ -75,21 +83,40 @@ class Reader:
         text = re.sub(r'^walk\b', f'walk{self.options}', command.partition('#')[0].strip())
         begun = self.changes
         name, *words = shlex.split(text.rstrip(' &'))
-        forked = name in EXECUTABLES and '|' not in words and self.options  # not of the README
-        process = self.processes.executable(
-            name, *words, folder=str(self.folder)) if forked else self.processes.start(
-            'bash', '-c', f'cd {self.folder}; PATH={BIN}:$PATH; exec {text.rstrip(" &")}')
-        if text.endswith('&'):
-            self.background.append(process)
-            self.ros.spin_until(lambda: self.changes > begun and self.settled(), PATIENCE_S,
-                                what=lambda: f'an effect of {process}')
-            return ''
-        self.ros.spin_until(lambda: not process.running, PATIENCE_S, what=lambda: str(process))
-        process.wait()
+        forked = name in EXECUTABLES and self.options  # not of the README
+        if forked and '|' in words:
+            printed = self.piped(text)
+        else:
+            process = self.processes.executable(
+                name, *words, folder=str(self.folder)) if forked else self.processes.start(
+                'bash', '-c', f'cd {self.folder}; PATH={BIN}:$PATH; exec {text.rstrip(" &")}')
+            if text.endswith('&'):
+                self.background.append(process)
+                self.ros.spin_until(lambda: self.changes > begun and self.settled(), PATIENCE_S,
+                                    what=lambda: f'an effect of {process}')
+                return ''
+            self.ros.spin_until(lambda: not process.running, PATIENCE_S, what=lambda: str(process))
+            process.wait()
+            printed = process.output
         if self.background:
             self.changed_ns = self.now_ns
             self.ros.spin_until(self.settled, PATIENCE_S, what=lambda: str(self.states))
-        return process.output
+        return printed
+
+    def piped(self, text: str) -> str:
+        """What a command prints through a pipe, and to its side; it is forked as the others are."""
+        command, _, filters = text.partition('|')
+        pipe, aside = self.folder / 'pipe', self.folder / 'aside'
+        pipe.unlink(missing_ok=True)
+        os.mkfifo(pipe)
+        process = self.processes.start('bash', '-c', f'< {pipe} {filters}')
+        with pipe.open('wb') as through, aside.open('wb') as errors:
+            forked = fork_server().start(
+                shlex.split(command), through.fileno(), errors.fileno(),
+                environment=self.processes.environment, folder=str(self.folder))
+        forked.wait(PATIENCE_S)
+        process.wait(PATIENCE_S)
+        return aside.read_text(encoding='utf-8') + process.output
 
     def end(self) -> None:
         self.processes.end()
