@@ -104,7 +104,7 @@ class Reader:
         return printed
 
     def piped(self, text: str) -> str:
-        """What a command prints through a pipe, and to its side; it is forked as the others are."""
+        """What a command prints through a pipe, and to its side; it is forked as others are."""
         command, _, filters = text.partition('|')
         pipe, aside = self.folder / 'pipe', self.folder / 'aside'
         pipe.unlink(missing_ok=True)
