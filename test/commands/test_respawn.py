@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -19,7 +20,15 @@ pytest.importorskip('mujoco')
 
 import numpy as np
 import ros_processes
-from ros_processes import RUN_S, SHARED_HZ, NodeProcess, Processes, Ros, wait_until
+from ros_processes import (
+    RUN_S,
+    SHARED_HZ,
+    NodeProcess,
+    Processes,
+    Ros,
+    reserved_domain,
+    wait_until,
+)
 from std_srvs.srv import SetBool
 
 from dmp_cpg_ros.analysis.loading import load_recording
@@ -224,18 +233,26 @@ PostureControl.on_tick = failing
 """What lets a node fail at every tick after the first second, in each Python that starts."""
 
 
-@pytest.mark.parametrize('options', [('--composed',), ('--processes', 'blocks', '--respawn')])
 def test_in_lock_step_a_node_that_fails_in_its_tick_is_named_and_ends_the_run(
-        processes: Processes, tmp_path: Path, options: Sequence[str]) -> None:
+        tmp_path: Path) -> None:
+    """Both ways at once, for most of their time they wait."""
     (tmp_path / 'site').mkdir()
     (tmp_path / 'site' / 'sitecustomize.py').write_text(FAILING, encoding='utf-8')
-    paths = os.pathsep.join((str(tmp_path / 'site'), processes.environment['PYTHONPATH']))
-    process = processes.python(
-        '-c', IMPATIENT, str(scenario(tmp_path, 4.0)), '--no-report', '--out',
-        str(tmp_path / 'run'), *LOCK_STEP, *options, PYTHONPATH=paths)
-    assert process.wait(RUN_S) == 1, str(process)
-    failed = r'posture_control: it failed in its tick at 1\.0\d\d s: OverflowError: of the test'
-    assert re.search(rf'the robot waits for .*{failed}', process.output), process
-    assert re.search(r'inhibition: it waits in its tick at 1\.0\d\d s of posture_feedback',
-                     process.output), process
-    assert re.search(rf'walk: \w+ hung: {failed}', process.output), process
+    brief, walks = scenario(tmp_path, 4.0), []
+    with contextlib.ExitStack() as domains:
+        for name, *options in (['composed', '--composed'],
+                               ['blocks', '--processes', 'blocks', '--respawn']):
+            own = Processes(domains.enter_context(reserved_domain()))
+            domains.callback(own.end)
+            paths = os.pathsep.join((str(tmp_path / 'site'), own.environment['PYTHONPATH']))
+            walks.append(own.python(
+                '-c', IMPATIENT, str(brief), '--no-report', '--out', str(tmp_path / name),
+                *LOCK_STEP, *options, PYTHONPATH=paths))
+        failed = (r'posture_control: it failed in its tick at 1\.0\d\d s: '
+                  'OverflowError: of the test')
+        for process in walks:
+            assert process.wait(RUN_S) == 1, str(process)
+            assert re.search(rf'the robot waits for .*{failed}', process.output), process
+            assert re.search(r'inhibition: it waits in its tick at 1\.0\d\d s of posture_feedback',
+                             process.output), process
+            assert re.search(rf'walk: \w+ hung: {failed}', process.output), process
