@@ -90,6 +90,26 @@ def test_what_it_prepares_for_nodes_is_there() -> None:
     fork_server.read_own_files()
 
 
+def test_who_ends_at_once_has_said_all_and_cleaned_up() -> None:
+    program = ('import atexit, sys\n'
+               'from dmp_cpg_ros.commands.fork_server import end\n'
+               "atexit.register(print, 'cleaned up')\n"
+               "print('said')\n")
+    buffered = {**os.environ, 'PYTHONUNBUFFERED': ''}
+
+    def run(last: str, output: int) -> subprocess.CompletedProcess[bytes]:
+        return subprocess.run([sys.executable, '-c', program + last], env=buffered, check=False,
+                              stdout=output, stderr=subprocess.PIPE)
+
+    ended, alone = run('end(3)', subprocess.PIPE), run('sys.exit(3)', subprocess.PIPE)
+    assert ended.returncode == alone.returncode == 3
+    assert ended.stdout == alone.stdout == b'said\ncleaned up\n'
+    with open('/dev/full', 'wb') as full:
+        ended, alone = run('end(3)', full.fileno()), run('sys.exit(3)', full.fileno())
+    assert ended.returncode == alone.returncode == 120
+    assert b'No space left' in ended.stderr
+
+
 def test_a_walk_that_was_forked_has_a_server_that_was(
         processes: Processes, tmp_path: Path) -> None:
     """Its environment is the one with which the program was started that has imported all."""
