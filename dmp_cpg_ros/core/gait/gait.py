@@ -10,8 +10,7 @@ standing height of the hip.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field
 from math import inf, nan, tau
@@ -25,7 +24,7 @@ from dmp_cpg_ros.core.gait import speed_limit
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce
 from dmp_cpg_ros.core.gait.lags import ENDS, SIDES, rest_phase, stance_groups, stand_together
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, interpolated
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.parameters import Key, check_names, needed
@@ -298,6 +297,17 @@ class Gait(CycleOfLegs):
             _strides=(nan, nan), _tables=(self._tables[0], cadence.tolist(), self._tables[2]))
         return scaled
 
+    def limiting(self, cadence_scale: float) -> Gait:
+        """Return the gait whose limits commands keep with a factor on the cadence: strides of a
+        slower one do not get longer, and hips have to swing the legs as fast as a quicker one.
+        """
+        if cadence_scale <= 1.0:
+            return self.scaled(cadence_scale)
+        quicker = copy(self)
+        vars(quicker).update(_nominal=[f * cadence_scale for f in self._nominal], _paced=None,
+                             _highest=(inf, self.highest_speed))
+        return quicker
+
     def following(self, omega: float, change_rate: float, pauses: bool, dt: float
                   ) -> tuple[Gait, float]:
         """Gait a time step later, and what oscillators gain on ω [rad]: the same, and nothing."""
@@ -307,11 +317,11 @@ class Gait(CycleOfLegs):
         """Angular frequency ω of the oscillators at a foot speed [rad/s]."""
         root = (GRAVITY / scale.leg_length) ** 0.5
         speed = foot_speed / (root * scale.leg_length)
-        return tau * root * _interpolated(speed, self._tables[0], self._tables[1])
+        return tau * root * interpolated(speed, self._tables[0], self._tables[1])
 
     def duty(self, foot_speed: float, scale: BodyScale) -> float:
         """Duty factor β at a foot speed."""
-        return _interpolated(
+        return interpolated(
             foot_speed / (GRAVITY * scale.leg_length) ** 0.5, self._tables[0], self._tables[2])
 
     def highest(self, scale: BodyScale) -> float:
@@ -323,28 +333,17 @@ class Gait(CycleOfLegs):
         if self._highest[0] != scale.swing:
             vars(self)['_highest'] = scale.swing, speed_limit.fastest_swing(
                 lambda u: speed_limit.swing_acceleration(
-                    u, _interpolated(u, speeds, self._nominal), _interpolated(u, speeds, duties)),
+                    u, interpolated(u, speeds, self._nominal), interpolated(u, speeds, duties)),
                 scale.swing / GRAVITY, self.highest_speed)
         highest = self._highest[1]
         if self.cadence_scale >= 1.0:
             return highest
         if self._strides[0] != highest:
             vars(self)['_strides'] = highest, speed_limit.fastest_stride(
-                lambda u: u * _interpolated(u, speeds, duties) / _interpolated(
+                lambda u: u * interpolated(u, speeds, duties) / interpolated(
                     u, speeds, self._nominal), self.cadence_scale, highest)
         return self._strides[1]
 
     def bounce(self, cycle_position: float, duty: float, omega: float) -> Bounce:
         """How the body rises and falls, see :mod:`~dmp_cpg_ros.core.gait.com_height`."""
         return planned_bounce(cycle_position, self.groups, duty, omega)
-
-
-def _interpolated(at: float, xs: Sequence[float], ys: Sequence[float]) -> float:
-    """Piecewise linear interpolation, constant outside, of plain floats: it runs at every tick."""
-    place = bisect_right(xs, at)
-    if place == 0:
-        return ys[0]
-    if place == len(xs):
-        return ys[-1]
-    share = (at - xs[place - 1]) / (xs[place] - xs[place - 1])
-    return ys[place - 1] + share * (ys[place] - ys[place - 1])

@@ -94,7 +94,7 @@ def limiting_gaits(parameters: GaitChoiceParameters, name: str, named: Callable[
     named : callable (str) → Gait
         Gait of a name.
     cadence_scale : float
-        Factor on the cadence that is wanted: a slower one limits commands, a quicker one does not.
+        Factor on the cadence that is wanted.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def limiting_gaits(parameters: GaitChoiceParameters, name: str, named: Callable[
         The gait, or all that may be chosen.
     """
     names = parameters.auto_gaits if parameters.auto_gait else (name,)
-    return tuple(named(each).scaled(min(cadence_scale, 1.0)) for each in names)
+    return tuple(named(each).limiting(cadence_scale) for each in names)
 
 
 def chosen_gait(parameters: GaitChoiceParameters, present: str, r: Array, scale: BodyScale) -> str:

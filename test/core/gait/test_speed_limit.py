@@ -142,6 +142,25 @@ def test_strides_of_a_slower_cadence_are_no_longer_than_the_longest(
         before = most
 
 
+@pytest.mark.parametrize('gait', sorted(GAITS))
+def test_commands_are_limited_to_what_hips_can_swing_at_a_quicker_cadence(gait: str) -> None:
+    scale, of = replace(SCALE, swing=150.0), GAITS[gait]
+
+    def needed(u: float, factor: float) -> float:
+        cadence, duty = (np.interp(u, of.speed, table) for table in (of.cadence, of.duty_factor))
+        return swing_acceleration(u, factor * float(cadence), float(duty)) * GRAVITY
+
+    before = of.highest(scale)
+    for factor in (1.5, 2.0, 4.0):
+        limiting, = limiting_gaits(GaitChoiceParameters(), gait, GAITS.__getitem__, factor)
+        most = limiting.highest(scale)
+        assert most <= before and needed(most, factor) <= 150.0 * (1.0 + 1e-9)
+        assert most == of.highest_speed or needed(1.001 * most, factor) > 150.0
+        assert limiting.omega(0.5, scale) == of.omega(0.5, scale)  # as the governor counts
+        before = most
+    assert before < of.highest(scale)
+
+
 @pytest.mark.parametrize(('gait', 'velocity'), [
     ('amble', (3.5, 0.0, 0.0)), ('trot', (-3.5, 0.0, 0.0)), ('walk', (0.0, 0.0, 2.2))])
 def test_a_robot_stays_up_at_the_slowest_cadence_whatever_it_is_told(
