@@ -144,7 +144,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                         help='run them on a dask.distributed cluster')
     parser.add_argument('--weaken', choices=WEAKENED, default='', help='leave this out')
     parser.add_argument('--failures', type=int, default=3, help='stop after this many')
-    parser.add_argument('--record', type=Path, help='Markdown file to add the counts to')
+    parser.add_argument('--record', type=Path, help='Markdown file to add the counts to, that is '
+                        'there')
     parser.add_argument('--auto', action='store_true',
                         help='attack the suite only, with inhibited_legs: [auto]')
     return run_command(parser, arguments, _attack)
@@ -154,6 +155,8 @@ def _attack(options: argparse.Namespace, _: RosArguments) -> int:
     jobs = [(1000 * options.seed + k, options.seconds, options.weaken, options.failures,
              options.auto)
             for k in range(options.workers)]
+    if options.record is not None:
+        readable(options.record).read_text(encoding='utf-8')  # fails before minutes of search
     if options.workers == 1 and not options.cluster:
         results = [search(*jobs[0])]
     else:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -167,6 +168,14 @@ def test_the_command_counts_what_it_tried(capsys: pytest.CaptureFixture[str],
     assert main(['--seconds', '60', '--weaken', 'capture', '--failures', '1']) == 1
     told = capsys.readouterr().out
     assert told.startswith('| 0 | 1 x 60 s | capture |') and 'happened: leaves C' in told
+
+
+def test_a_record_that_is_not_there_is_told_before_the_search(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(adversary, 'search', lambda *_: pytest.fail('searched'))
+    assert main(['--record', str(tmp_path / 'none.md')]) == 2
+    assert 'none.md' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize('kind', ['leave', 'forget'])
