@@ -73,8 +73,22 @@ def growth_in(system: CanonicalSystem, omega: float | Array, capture: CaptureSet
 
 
 class Relieved(NamedTuple):
-    """M = L + diag α, the growth g of a box, the distances M⁻¹g that nodes bear together, r0 over
-    the largest of those that are inhibited, which are they, and the gains that they need.
+    """What nodes bear that relieve each other.
+
+    Attributes
+    ----------
+    M : ndarray (N, N)
+        L + diag α [1/s].
+    g : ndarray (N,)
+        Growth of a box [1/s].
+    borne : ndarray (N,)
+        Distances M⁻¹ g that nodes bear together.
+    spare : float
+        r0 over the largest of those of inhibited nodes.
+    held : ndarray (N,) of bool
+        Which nodes are inhibited.
+    needed : ndarray (N,)
+        Gains that they need [1/s]; NaN for the others.
     """
 
     M: Array
@@ -113,8 +127,10 @@ class Relieved(NamedTuple):
 
 
 def relieved(system: CanonicalSystem, capture: CaptureSet, growth: Array, region_radius: float
-              ) -> Relieved | None:
-    """What nodes bear together; None where nothing is known of it."""
+             ) -> Relieved | None:
+    """What nodes bear together that grow by at most :func:`growth_in` (N,) [1/s]; None where
+    nothing is known of it.
+    """
     held, L = ~np.isnan(capture.needed_gain), comparison_laplacian(system.graph)
     M, most = L + np.diag(capture.gains), float(np.abs(L).max() + capture.gains.max())
     if L.sum(axis=1).min() < -1e-9 * most:
@@ -127,7 +143,7 @@ def relieved(system: CanonicalSystem, capture: CaptureSet, growth: Array, region
     if not borne.min() > 0.0:  # so that M is no M-matrix (Berman & Plemmons 1994, 6.2.3)
         return None
     return Relieved(M, g, borne, float((region_radius / borne[held]).min()), held,
-                     np.where(held, capture.gains * borne / region_radius, np.nan))
+                    np.where(held, capture.gains * borne / region_radius, np.nan))
 
 
 def different_voters(system: CanonicalSystem, count: int) -> list[tuple[int, ...]]:

@@ -149,8 +149,9 @@ class CycleOfLegs(ABC):
         """Velocity (v_x, v_y [m/s], γ [rad/s]) within the highest speed and the largest curve, as
         a share of g, that goes with it: :mod:`~dmp_cpg_ros.core.gait.speed_limit`.
         """
-        return speed_limit.within_limit(velocity, self.limiting_speed(velocity, scale),
-                            scale.speed(self.highest(scale)), largest_curve * GRAVITY)
+        return speed_limit.within_limit(
+            velocity, self.limiting_speed(velocity, scale), scale.speed(self.highest(scale)),
+            largest_curve * GRAVITY)
 
     def pace(self, r: Array, scale: BodyScale) -> Pace:
         """What the gait makes of a reference (v_x, v_y, γ), ndarray (3,); the last answer is
@@ -298,8 +299,8 @@ class Gait(CycleOfLegs):
         return scaled
 
     def limiting(self, cadence_scale: float) -> Gait:
-        """Return the gait whose limits commands keep with a factor on the cadence: strides of a
-        slower one do not get longer, and hips have to swing the legs as fast as a quicker one.
+        """Return the gait whose limits commands keep at a positive factor on the cadence: strides
+        of a slower one do not get longer, and hips can swing the legs as fast as a quicker one.
         """
         if cadence_scale <= 1.0:
             return self.scaled(cadence_scale)

@@ -36,7 +36,8 @@ with τ the torque of the hip joint, I the leg's inertia about it and l the heig
 the hip alone gives to a foot under it.
 
 A cadence that is slower than the gait's by a factor c < 1 has longer strides, u β/(c f), which
-legs reach no farther for. They stay within those of the gait at its highest speed.
+legs reach no farther for. They stay within those of the gait at its highest speed. At a quicker
+one the same hips swing the legs c times as often: commands keep to the inequality with c f.
 """
 
 from __future__ import annotations
