@@ -18,7 +18,7 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.step import cycle_radius_error, longest_step
-from dmp_cpg_ros.core.contraction.capture import CaptureSet, capture_set, radius_tolerance
+from dmp_cpg_ros.core.contraction.capture import capture_set, radius_tolerance
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, NONE, inhibited_contraction
 from dmp_cpg_ros.core.contraction.synchronisation import (
@@ -42,7 +42,7 @@ KINDS = (*TOPOLOGIES, 'sparse', 'directed', 'unbalanced')
 
 
 def certified(case: Case, entry: Case, system: CanonicalSystem, free: Synchronisation,
-              weaken: str = '', known: CaptureSet | None = None) -> Certified | None:
+              weaken: str = '') -> Certified | None:
     """Certificate of one setting of a network; None where it has none.
 
     Parameters
@@ -55,8 +55,6 @@ def certified(case: Case, entry: Case, system: CanonicalSystem, free: Synchronis
         Of the couplings at gain 1.
     weaken : str
         One of ``WEAKENED``, or empty.
-    known : CaptureSet, optional
-        With other gains of the same nodes.
     """
     radius, rho, k, size = system.radius, case['rho'], entry['coupling'], system.graph.size
     free_rate = k * free.connectivity - rho * float(radius.max()) ** 2
@@ -64,7 +62,7 @@ def certified(case: Case, entry: Case, system: CanonicalSystem, free: Synchronis
     if free_rate <= 0.0 and weaken != 'synchronisation' or not held.any():
         return None
     gains = held * entry['inhibition'] * (0.8 if weaken == 'capture' else 1.0)
-    capture = capture_set(system, entry['omega'], gains, entry['region_radius'], known=known)
+    capture = capture_set(system, entry['omega'], gains, entry['region_radius'])
     found = inhibited_contraction(system, capture)
     if not (capture.holds or weaken == 'capture') or capture.tolerance <= 0.0 or (
             found.reach == NONE and weaken not in ('contraction', 'capture')):
@@ -283,11 +281,11 @@ def _just_certified(rng: np.random.Generator, case: Case, entries: list[Case], w
     for entry in entries:
         system = _system(case, entry)
         held = np.isin(np.arange(system.graph.size), entry['held']).astype(float)
-        known = capture_set(system, entry['omega'], held, entry['region_radius'])
-        needed = float(np.nanmax(known.needed_gain))
+        needed = float(np.nanmax(capture_set(
+            system, entry['omega'], held, entry['region_radius']).needed_gain))
         entry['inhibition'] = max(needed, 1e-6) * (1.0 + 10.0 ** rng.uniform(
             -6.0, math.log10(0.05) if rng.random() < 0.7 else 1.0))
-        found.append(certified(case, entry, system, free, weaken, known))
+        found.append(certified(case, entry, system, free, weaken))
     settings = [one for one in found if one is not None]
     if not settings:
         return None

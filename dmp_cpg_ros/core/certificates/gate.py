@@ -21,6 +21,7 @@ from dmp_cpg_ros.core.certificates.timing import later_arming
 from dmp_cpg_ros.core.certificates.votes import VOTE_ROWS
 from dmp_cpg_ros.core.contraction.capture import RADIUS_TOLERANCE, capture_set
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, inhibited_contraction
+from dmp_cpg_ros.core.contraction.voting import different_voters
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
@@ -94,6 +95,13 @@ class Running:
         """Inequalities of voting, or all of the first gait in which one is lost."""
         of = self._of_certificate
         return votes_among(of.parameters, of.networks, of.tick_s, until_lost=until_lost)
+
+    @property
+    def effort(self) -> int:
+        """How long a certificate takes: number of networks, times that of sets of voters."""
+        networks, voting = self.networks, self.parameters.voting
+        return len(networks) * (1 + voting.voting * len(
+            different_voters(networks[0].system, voting.majority)))
 
     @property
     def networks(self) -> list[GaitNetwork]:

@@ -28,6 +28,10 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 _ROUNDS, _FEWER_ROUNDS = 5, 3
 """How often the way to what is refused is halved: of one gait without votes, and else."""
 
+MOST_EFFORT = 24
+"""Most :attr:`Running.effort` of a verdict that looks for what would work, for its time to stay
+bounded: about 2 ms each on a slow core."""
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -108,25 +112,28 @@ class Change:
 
     def _nearest(self, held: bool, name: str) -> str:
         """Nearest values that work, as text, where an inequality of a name is lost."""
+        looks = _Looks(MOST_EFFORT - self.proposed.effort)
         differences = self.present.differences(self.proposed)
         numbers = {name: pair for name, pair in differences.items() if isinstance(pair[0], float)}
         words = {name: pair[1] for name, pair in differences.items() if name not in numbers}
         with_words = self.present.changed(words)
-        if words and _first_lost(with_words, name if numbers else ''):
-            return self._choices(words)
+        if words and looks.first_lost(with_words, name if numbers else ''):
+            return self._choices(words, looks)
         if not (held or words) or not numbers:
             return 'nothing nearer is known: the running parameters are not certified themselves'
         values = nearest_values(
-            numbers, lambda at, among: _first_lost(with_words.changed(at), among),
+            numbers, lambda at, among: looks.first_lost(with_words.changed(at), among),
             name, _FEWER_ROUNDS if self.present.others or self.proposed.values['voting']
             else _ROUNDS)
-        if words and values == {name: before for name, (before, _) in numbers.items()} and (
-                _first_lost(with_words)):
-            return self._choices(words)
+        none = values == {name: before for name, (before, _) in numbers.items()}
+        if none and words and looks.first_lost(with_words):
+            return self._choices(words, looks)
+        if none and looks.left <= 0:
+            return _TOO_LONG
         told = ', '.join(f'{name} = {typed(value)}' for name, value in values.items())
         return f'nearest value{"s that work" if len(values) > 1 else " that works"}: {told}'
 
-    def _choices(self, words: Mapping[str, Any]) -> str:
+    def _choices(self, words: Mapping[str, Any], looks: _Looks) -> str:
         """Other words that work in place of those that were asked for."""
         found, holds = [], dict[Any, bool]()
         for name, asked in words.items():
@@ -135,12 +142,32 @@ class Change:
                 changed = self.proposed.changed({name: choice})
                 kind = name, _alike(changed, choice) if name == 'inhibited_legs' else choice
                 if kind not in holds:
-                    holds[kind] = choice != asked and not _first_lost(changed)
+                    holds[kind] = choice != asked and not looks.first_lost(changed)
                 if choice != asked and holds[kind]:
                     working.append(typed(choice))
-            found.append(f'{name} = {" or ".join(working)}' if working else
-                         f'no other {name} with the rest as it is')
-        return f'what works: {"; ".join(found)}'
+            if working:
+                found.append(f'{name} = {" or ".join(working)}')
+            elif looks.left > 0:
+                found.append(f'no other {name} with the rest as it is')
+        return f'what works: {"; ".join(found)}' if found else _TOO_LONG
+
+
+_TOO_LONG = 'nothing nearer was looked for: with votes, in these gaits, that takes too long'
+
+
+@dataclass
+class _Looks:
+    """What is looked at for something that works, until the effort that is left is spent; beyond
+    that nothing is found to work.
+    """
+
+    left: int
+
+    def first_lost(self, running: Running, among: str = '') -> str:
+        """:meth:`Running.first_lost`, or that it is not known."""
+        effort = running.effort if among in ('', *VOTE_ROWS) else 1
+        self.left = self.left - effort if self.left >= effort else 0
+        return _first_lost(running, among) if self.left > 0 else 'unknown'
 
 
 def _first_lost(running: Running, among: str = '') -> str:

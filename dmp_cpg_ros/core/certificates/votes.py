@@ -17,6 +17,7 @@ from functools import lru_cache
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.timing import LONGEST_STOP, time_to_rest
@@ -94,12 +95,13 @@ def vote_bound(s: Setting, gains: Array) -> float:
     float
         [s], for legs that are in their places; infinite without a certificate.
     """
-    return _under(s, gains)[2]
+    return _under(s, s.network.system, gains)[2]
 
 
-def _under(s: Setting, gains: Array) -> tuple[float, inhibited.InhibitedContraction, float]:
+def _under(s: Setting, system: CanonicalSystem, gains: Array
+           ) -> tuple[float, inhibited.InhibitedContraction, float]:
     """Gain that capture needs, contraction, and bound on the time to rest under some votes."""
-    system, s = s.network.system, replace(s, way=2.0 * math.pi)   # votes wait for fl's phase 0
+    s = replace(s, way=2.0 * math.pi)                             # votes wait for fl's phase 0
     omega, r0 = s.span.omega_armed[1], s.parameters.inhibition.region_radius
     capture = shared_capture(system, omega, capture_set(system, omega, gains, r0), r0)
     found = inhibited.inhibited_contraction(system, capture)
@@ -131,10 +133,11 @@ def vote_inequalities(s: Setting) -> list[Inequality]:
 @lru_cache(maxsize=32)
 def _rows(asked: _Asked) -> tuple[Inequality, ...]:
     s = asked.setting
-    p, voting, system = s.parameters.inhibition, s.parameters.voting, s.network.system
+    p, voting = s.parameters.inhibition, s.parameters.voting
     clamp, count = vote_clamp(s.network, p, voting, s.span), voting.majority
+    system = clamp.window.system
     legs, acting = np.arange(system.graph.size), max(clamp.gain, 1e-9)
-    needed, found, bounds = zip(*(_under(s, np.where(np.isin(legs, voters), acting, 0.0))
+    needed, found, bounds = zip(*(_under(s, system, np.where(np.isin(legs, voters), acting, 0.0))
                                   for voters in different_voters(system, count)), strict=True)
     worst = min(found, key=lambda contraction: contraction.rate)
     who = 'any leg alone' if count == 1 else f'any {count} legs'

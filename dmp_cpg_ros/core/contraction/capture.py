@@ -22,12 +22,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import phase_rotation
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.contraction.synchronisation import (
     comparison_laplacian,
@@ -82,8 +83,7 @@ class CaptureSet:
 
 
 def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
-                region_radius: float, places: float = PLACE_TOLERANCE,
-                known: CaptureSet | None = None) -> CaptureSet:
+                region_radius: float, places: float = PLACE_TOLERANCE) -> CaptureSet:
     """Build the invariant set of an inhibited network.
 
     Parameters
@@ -98,8 +98,6 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
         r0 of C_i = {|x_i − x_{i,d}| ≤ r0}.
     places : float
         Largest distance of a node from its place at capture, as a fraction of |x_d|.
-    known : CaptureSet, optional
-        Of other ``places``, or other gains of the same nodes: the box depends on neither.
 
     Returns
     -------
@@ -120,14 +118,8 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
         raise ParameterError(f'frequencies {omega.tolist()} must be finite, and gains '
                              f'{gains.tolist()} finite and not negative')
     inhibited = gains > 0.0
-    D = target_radius(system, inhibited)
-    L = comparison_laplacian(system.graph)
-    largest = invariant_radius(
-        max(float(system.radius.max()), D), overshoot(L), float(system.rho.min()))
-    u = known.distance if known else _distances(
-        system, L, omega, inhibited, D, region_radius, largest + D)
-    needed = known.needed_gain if known else np.where(
-        inhibited, (outward_growth(system, omega, D, u) - L @ u) / region_radius, np.nan)
+    D, L, largest, u, needed = _box(
+        system, omega.tobytes(), inhibited.tobytes(), float(region_radius))
     tolerance = places * D
     if np.any(~inhibited):
         tolerance = min(tolerance, float(u[~inhibited].min()) - region_radius)
@@ -135,6 +127,21 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     inner = _smallest_radii(system, M, omega, u, D, region_radius, largest, tolerance)
     rate = slowest_rate(M - np.diag(growth(system.rho, system.radius, inner)))
     return CaptureSet(u, inner, needed, gains, tolerance, rate)
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _box(system: CanonicalSystem, frequencies: bytes, nodes: bytes, region_radius: float
+         ) -> tuple[float, Array, float, Array, Array]:
+    """|x_d|, L, the invariant disc, ū and the needed gains, which depend on no gain."""
+    omega, inhibited = np.frombuffer(frequencies), np.frombuffer(nodes, dtype=bool)
+    D, L = target_radius(system, inhibited), comparison_laplacian(system.graph)
+    largest = invariant_radius(
+        max(float(system.radius.max()), D), overshoot(L), float(system.rho.min()))
+    u = _distances(system, L, omega, inhibited, D, region_radius, largest + D)
+    needed = np.where(
+        inhibited, (outward_growth(system, omega, D, u) - L @ u) / region_radius, np.nan)
+    u.flags.writeable = needed.flags.writeable = False
+    return D, L, largest, u, needed
 
 
 def place_tolerance(omega: float, degree: float, radius: float) -> float:

@@ -102,7 +102,7 @@ class Capture:
         if self._global:
             return True
         found = capture_set(self.system, self.omega, self.gains, self.region_radius,
-                            places / self.radius, self.undelayed)
+                            places / self.radius)
         return found.rate > 0.0 and found.tolerance >= places * (1.0 - 1e-12)
 
     def growth_out(self, u: Array) -> Array:

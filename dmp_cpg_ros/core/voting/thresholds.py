@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import cached_property, reduce
 from math import log
 
 import numpy as np
@@ -34,21 +34,36 @@ _MOST_STEPS = 8
 
 @dataclass(frozen=True)
 class MajorityClamp:
-    """Clamp of the voters' weights for which a majority stops the gait and fewer do not.
+    """Clamp of the voters' weights for which a majority stops the gait and fewer do not; each end
+    is computed when it is first asked for.
 
     Attributes
     ----------
-    lowest : float
-        Certified: with this α any majority stops the gait [1/s].
-    highest : float
-        Below this α no smaller vote has an equilibrium inside its regions [1/s].
+    system, region_radius : CanonicalSystem, float
+        Coupled oscillators, r0 of the regions C_i.
+    fastest, slowest : float
+        Largest and smallest angular frequency [rad/s].
     majority : int
         Number of votes that is needed.
     """
 
-    lowest: float
-    highest: float
+    system: CanonicalSystem
+    region_radius: float
+    fastest: float
+    slowest: float
     majority: int
+
+    @cached_property
+    def lowest(self) -> float:
+        """Certified: with this α any majority stops the gait [1/s]."""
+        return enough_for_all(self.system, self.fastest, different_voters(
+            self.system, self.majority), self.region_radius)
+
+    @cached_property
+    def highest(self) -> float:
+        """Below this α no smaller vote has an equilibrium inside its regions [1/s]."""
+        return too_weak_for_all(self.system, self.slowest, different_voters(
+            self.system, self.majority - 1), self.region_radius)
 
     @property
     def possible(self) -> bool:
@@ -163,7 +178,7 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
             capture = replace(capture, needed_gain=found.needed)
         if beyond < 0.0 or inhibited_contraction(system, capture).reach == GLOBAL:
             return beyond
-        rate = capture_set(system, omega, capture.gains, region_radius, known=box).rate
+        rate = capture_set(system, omega, capture.gains, region_radius).rate
         reach = inhibited_contraction(system, replace(capture, rate=rate)).reach
         return -np.inf if reach == NONE else beyond
 
@@ -210,11 +225,8 @@ def majority_clamp(system: CanonicalSystem, omega: float, region_radius: float,
     if not 1 <= majority <= size:
         raise ParameterError(f'majority = {majority} must lie between 1 and {size}, the number of '
                              'oscillators')
-    slowest = omega if slowest_omega is None else slowest_omega
-    return MajorityClamp(
-        enough_for_all(system, omega, different_voters(system, majority), region_radius),
-        too_weak_for_all(system, slowest, different_voters(system, majority - 1), region_radius),
-        majority)
+    return MajorityClamp(system, region_radius, omega,
+                         omega if slowest_omega is None else slowest_omega, majority)
 
 
 def enough_for_all(system: CanonicalSystem, omega: float | Array,

@@ -13,7 +13,8 @@ from core_examples import GAITS, TICK, TICK_NS, network, quadruped, standing_sta
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.gate import Running
-from dmp_cpg_ros.core.certificates.verdict import Change
+from dmp_cpg_ros.core.certificates.verdict import MOST_EFFORT, Change
+from dmp_cpg_ros.core.certificates.votes import VOTE_ROWS
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares, KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, network_system
@@ -292,3 +293,34 @@ def test_votes_are_judged_alike_in_gaits_of_one_cadence() -> None:
             certified_threshold(other, 9.0, voters, 0.3), rel=2e-4)
         assert rest_threshold(system, 5.0, voters, 0.3) == pytest.approx(
             rest_threshold(other, 5.0, voters, 0.3), rel=2e-4)
+
+
+@pytest.mark.parametrize('values', [{'region_radius': 0.05}, {'inhibition_gain': 90.0, 'rho': 9.0},
+                                    {'coupling_graph': 'path', 'inhibition_gain': 90.0},
+                                    {'vote_majority': 4, 'vote_limit': 9.0}], ids=str)
+@pytest.mark.parametrize('graph', ['all_to_all', 'ring', 'path', 'star', 'directed_ring'])
+@pytest.mark.parametrize('count', [1, 3])
+def test_what_looking_for_a_value_that_works_takes_is_bounded_and_what_is_told_works(
+    count: int, graph: str, values: dict[str, object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However many gaits are walked, whoever may vote."""
+    gaits = [GAITS[name] for name in ('amble', 'trot', 'bound')[:count]]
+    running = replace(RUNNING.changed({
+        'voting': True, 'coupling_graph': graph, 'coupling_gain': 200.0}),
+        gait=gaits[0], others=tuple(gaits[1:]))
+    looked, first_lost = [0], Running.first_lost
+
+    def counted(of: Running, among: str = '') -> str:
+        looked.append(of.effort if among in ('', *VOTE_ROWS) else 1)
+        return first_lost(of, among)
+
+    monkeypatch.setattr(Running, 'first_lost', counted)
+    asked = running.changed(values)
+    verdict = Change(running, running.certificate(), asked).verdict()
+    assert not verdict.accepted
+    assert sum(looked) + asked.effort <= max(MOST_EFFORT, asked.effort)
+    told = dict(re.findall(r'(\w+) = ([\d.]+)(?:,|$)', verdict.reason.rpartition(': ')[2]))
+    if told and 'nearest value' in verdict.reason:
+        assert asked.changed({name: float(value) for name, value in told.items()}).holds()
+    else:
+        assert 'what works' in verdict.reason or 'looked for' in verdict.reason
