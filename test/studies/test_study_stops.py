@@ -22,7 +22,7 @@ pytest.importorskip('mujoco')
 from dmp_cpg_ros.core.robot_model.grounds import Blocks, Slope
 from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary, body_at_rest, suite_of
 from dmp_cpg_ros.studies.random_stops import ROUGHNESS, random_cases, scenario_bound, summary
-from dmp_cpg_ros.studies.stop_trials import StopCase, run_cases
+from dmp_cpg_ros.studies.stop_trials import StopCase, run_cases, run_walk
 from dmp_cpg_ros.studies.workers import Workers
 
 ROBOT = quadruped()
@@ -130,6 +130,15 @@ def test_no_foot_is_left_hanging_by_a_stop_on_uneven_ground(case: StopCase) -> N
     case = replace(case, leg='auto', braking=4.0, resumes=False)
     _, outcome = run_cases([case], None, Workers(1))[0]
     assert outcome.standing and outcome.still_s < 1.0 and outcome.tilt < 0.15
+
+
+@pytest.mark.parametrize(('gait', 'speed'), [('amble', 0.5), ('walk', 0.4), ('trot', 0.5),
+                                             ('pronk', 0.3)])
+def test_a_body_stands_when_it_was_told_to(gait: str, speed: float) -> None:
+    """Some swing back over their feet and take longer: ambles by themselves, all when fast."""
+    cases = [StopCase(gait, speed, phase, resumes=False) for phase in (0.1, 0.6)]
+    for of in run_walk(cases, None):
+        assert of.standing and of.stands_s == pytest.approx(of.still_s, rel=0.1)
 
 
 def test_a_record_is_gone_on_with_and_changes_nothing(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ flat, slopes and hills with friction of 0.3 to 1, a payload of up to 30 % and a 
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
-from math import ceil, hypot, inf, nan
+from math import ceil, exp, hypot, inf, nan
 from typing import Any, NamedTuple
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
@@ -29,9 +29,19 @@ from dmp_cpg_ros.core.transformation.foot_path import swing_height
 DOWN = 0.2
 """Share of the swing's height below which a foot that comes down counts as down."""
 
-CALMING, LONGEST_CALMING = 0.31, 0.8
-"""Time from the last foot's coming down until the body stands still: what it takes, and what no
-trial exceeded [s].
+CALMING, AT_ONCE, LANDED, LONGEST_CALMING = 0.31, 0.12, 0.44, 0.8
+"""Time from the last foot's coming down until the body stands still [s]: where it swings back over
+its feet, where it does not, where all feet come down at once, and what no trial exceeded.
+"""
+
+FOLLOWING, SLOW = 0.1, 0.12
+"""The body follows the reference's speed in this time [s], and does not swing back if it goes
+slower than this [m/s] as the last foot comes down.
+"""
+
+BALANCED, OWN_CADENCE = 0.9, 0.95
+"""Share of the stance in which feet of both sides and ends stand, and factor on a gait's cadence,
+from which on a body does not sway by itself: in walk and trot, not in an amble.
 """
 
 FARTHER = 0.1, 0.25
@@ -55,17 +65,20 @@ class Outlook(NamedTuple):
         Of the reference until then [m].
     speed : float
         |v| of the reference now [m/s].
+    calming_s : float
+        From the last foot's coming down until the body stands, in the middle of trials [s].
     """
 
     time_s: float
     down_s: float
     way_m: float
     speed: float
+    calming_s: float = CALMING
 
     @property
     def stands_s(self) -> float:
         """Time until the body stands: below 2 cm/s on four feet, in the middle of trials [s]."""
-        return self.down_s + CALMING
+        return self.down_s + self.calming_s
 
     @property
     def stands_within_s(self) -> float:
@@ -113,6 +126,7 @@ def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canoni
         At the end.
     """
     down_s, way_m, speed, stop = 0.0, 0.0, hypot(r[0], r[1]), state.requested
+    body, calming_s, followed = speed, CALMING, 1.0 - exp(-dt / FOLLOWING)
     ticks = ticks_ahead(supervisor, reference, canonical, state, published, canon, r, command, dt,
                         body_mode, lead_ns)
     for k, (state, _, canon, r) in zip(range(1, ceil(horizon / dt) + 1), ticks, strict=False):
@@ -121,11 +135,24 @@ def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canoni
         yield
         if stop:
             way_m += dt * hypot(r[0], r[1])
+            body += followed * (hypot(r[0], r[1]) - body)
             if _up(canon, state, canon.gait.pace(r, canonical.scale)[3]):
-                down_s = k * dt
+                down_s, calming_s = k * dt, _calming(
+                    canon.gait, body, reference.parameters.braking > 0.0)
         if state.state in ('at_rest', 'walking', 'free', 'stepping'):
-            return Outlook(k * dt, down_s if stop else nan, way_m, speed)
+            return Outlook(k * dt, down_s if stop else nan, way_m, speed, calming_s)
     return Outlook(inf, nan, nan, speed)
+
+
+def _calming(gait: GaitInForce, speed: float, brakes: bool) -> float:
+    """How long a body takes to calm down that goes so fast [m/s] as the last foot comes down, in
+    the middle of trials [s].
+    """
+    if gait.apart == 0.0:
+        return LANDED
+    sways = not (gait.firm >= 1.0 and gait.two_sided >= BALANCED
+                 and gait.cadence_scale >= OWN_CADENCE)
+    return CALMING if sways or brakes or speed > SLOW else AT_ONCE
 
 
 def look_ahead(*arguments: Any, **options: Any) -> Outlook:
