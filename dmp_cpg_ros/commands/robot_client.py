@@ -34,7 +34,7 @@ from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.nodes.framework.execution import OK
 from dmp_cpg_ros.nodes.framework.parameters import plain
-from dmp_cpg_ros.nodes.messages.commands import push_force
+from dmp_cpg_ros.nodes.messages.commands import push_force, read_push_force
 from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, TOPICS, interface
 from dmp_cpg_ros.strict_yaml import parse_yaml
 from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
@@ -92,9 +92,14 @@ def publish_command(client: SuiteClient, options: argparse.Namespace) -> None:
 
 
 def push(client: SuiteClient, options: argparse.Namespace) -> None:
-    """Push the simulated robot."""
+    """Push the simulated robot; what it would refuse is not sent."""
+    message = push_force(options.force)
+    try:
+        read_push_force(message)
+    except DataError as error:
+        raise ParameterError(str(error)) from None
     publisher = client.publisher(interface('push'))
-    publisher.publish(push_force(options.force))
+    publisher.publish(message)
     deliver(publisher)
 
 

@@ -258,6 +258,7 @@ def test_a_message_is_printed_as_yaml(suite: Processes) -> None:
 def test_what_is_not_finite_is_bad_input(suite: Processes) -> None:
     assert 'finite' in refused(suite, 'cmd_vel', 'nan', status=2)
     assert 'finite' in refused(suite, 'push', '0', 'inf', '0', status=2)
+    assert 'at most 15000 N' in refused(suite, 'push', '1e6', '0', '0', status=2)
 
 
 def test_who_reads_no_further_ends_a_list_quietly(suite: Processes) -> None:
