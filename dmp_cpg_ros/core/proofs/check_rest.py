@@ -84,9 +84,11 @@ def falling(p: Any, s: Any) -> tuple[Any, ...]:
                 lambda v, of=of: [x + near for x in of(v)] for of in off))[2], near)
 
 
-def time_to_rest(p: Any, w: Any, s: Any) -> F:
-    """Bound on the time from a request to rest [s]; w are the witnesses of check_proof.py."""
-    Z, P, S, G, Y, near = whole(falling(p, s))
+def time_to_rest(p: Any, w: Any, s: Any, fallen: Any = ()) -> F:
+    """Bound on the time from a request to rest [s]; w are the witnesses of check_proof.py. What
+    falling(p, s) is may be known.
+    """
+    Z, P, S, G, Y, near = whole(fallen or falling(p, s))
     h, r, u, R, tick, slow = check_step.step_of(p), p['radius'], s['box'], s['disc'], p['tick'], p[
         'omega_armed_min']
     y, _, error = w['equilibria'][1]

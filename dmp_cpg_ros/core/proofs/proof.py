@@ -26,7 +26,7 @@ from dmp_cpg_ros.core.contraction.synchronisation import cascade_weights, slowes
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.proofs import check_proof as exact
-from dmp_cpg_ros.core.proofs.step_proof import rest_proof, step_proof
+from dmp_cpg_ros.core.proofs.step_proof import falling, rest_proof, step_proof
 
 Values = dict[str, Any]
 
@@ -72,7 +72,8 @@ def proof_of(s: Setting) -> Values:
             w = completed(p, _chosen(p, analysis, shares, regional, slower))
             if step is None:
                 step = step_proof(p, w['xi'], stepped_network(s, analysis))
-            rest = rest_proof(p, w, step)
+                fallen = falling(p, step)
+            rest = rest_proof(p, w, step, fallen)
             proof = written(p, w, exact.rows(p, w, not rest), step, rest)
             exact.check(proof)
             return proof

@@ -45,7 +45,21 @@ def step_proof(p: Values, xi: list[Fraction], found: SteppedNetwork | None) -> V
         left < right for left, right in rows.values()) else {}
 
 
-def rest_proof(p: Values, w: Values, step: Values) -> Values:
+def falling(p: Values, step: Values) -> tuple[Any, ...]:
+    """What bounds how the step comes to rest, whatever else a proof has; empty where nothing does.
+
+    Parameters
+    ----------
+    p, step : dict
+        As for :func:`rest_proof`.
+    """
+    try:
+        return check_rest.falling(p, step['witnesses'])
+    except (ArithmeticError, LookupError, ValueError):
+        return ()
+
+
+def rest_proof(p: Values, w: Values, step: Values, fallen: tuple[Any, ...] = ()) -> Values:
     """Row of the time in which the step comes to rest; empty where it is not proved.
 
     Parameters
@@ -54,9 +68,11 @@ def rest_proof(p: Values, w: Values, step: Values) -> Values:
         Parameters and witnesses of a proof, as fractions.
     step : dict
         From :func:`step_proof`.
+    fallen : tuple
+        From :func:`falling`, where it is known.
     """
     try:
-        bound = check_rest.time_to_rest(p, w, step['witnesses'])
+        bound = check_rest.time_to_rest(p, w, step['witnesses'], fallen)
     except (ArithmeticError, LookupError, ValueError):
         return {}
     return {'step_time_to_rest': (bound, check_rest.LONGEST)} if (
