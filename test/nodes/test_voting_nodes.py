@@ -41,7 +41,7 @@ name: votes
 duration: 6.6
 parameters:
   {voting: true, coupling_gain: 5.0, inhibited_legs: [fl, fr, rl], physics: perfect_tracking,
-   control_rate: 100.0}
+   control_rate: 50.0}
 events:
   - {at: 0.1, inhibit: false}
   - {at: 0.1, command: {v_x: 0.3}}

@@ -17,7 +17,6 @@ pytest.importorskip('rclpy')
 
 from checkout import setup_constant
 from ros_processes import (
-    SHARED_HZ,
     NodeProcess,
     Processes,
     Ros,
@@ -44,6 +43,9 @@ AT_USUAL_RATE = ('README.md',)
 """Documents that show numbers which depend on the control rate; the walks of all others are
 typed with the option of another one: the machine has less to do.
 """
+
+RATE_HZ = 100.0
+"""That rate; at half of it a change that is refused loses rows of the step, too."""
 
 PATIENCE_S = 240.0
 """How long a loaded machine may take [s]."""
@@ -129,7 +131,7 @@ def reader(document: Path, tmp_path: Path) -> Iterator[Reader]:
         patch.setenv('ROS_DOMAIN_ID', str(domain))
         prepare_middleware()
         started = Reader(domain, tmp_path, '' if document.name in AT_USUAL_RATE else (
-            f' --rate {SHARED_HZ}'))
+            f' --rate {RATE_HZ}'))
         try:
             yield started
         finally:

@@ -142,7 +142,8 @@ class Reader:
                 process.interrupt()
             if processes is self.suites:
                 for process in processes:
-                    wait_until(lambda of=process: not of.running or 'lie_down: ' in of.output)
+                    wait_until(lambda of=process: not of.running or 'lie_down: ' in of.output,
+                               PATIENCE_S)  # a film may be made
                     if process.running:
                         process.interrupt()
             for process in processes:

@@ -17,7 +17,7 @@ pytest.importorskip('mujoco')
 
 import ros_processes
 from rclpy.qos import ReliabilityPolicy
-from ros_processes import Processes
+from ros_processes import SHARED_HZ, Processes
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.nodes.messages.interfaces import EVERY_TICK, TOPICS
@@ -158,7 +158,7 @@ def test_a_robot_walks_by_controllers_on_another_host_and_stands_when_the_link_i
     study = processes.python(
         '-m', 'dmp_cpg_ros.studies.two_hosts', '--seconds', '1.5', '--then', '0', '0', '100',
         '--loss', '0', '--delivery', 'reliable', '--peers', '--json', str(results),
-        '--ros-args', '-p', 'longest_lag:=0.024')
+        '--ros-args', '-p', 'longest_lag:=0.024', '-p', f'control_rate:={SHARED_HZ}')
     assert study.wait(240.0) == 0, study
     told = json.loads(results.read_text(encoding='utf-8'))
     walked, cut = told['phases']

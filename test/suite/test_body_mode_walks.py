@@ -24,7 +24,7 @@ processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 UP_AND_DOWN = """\
 name: up_and_down
 duration: 4.2
-parameters: {start_mode: lying, start_pose: lying, control_rate: 100.0}
+parameters: {start_mode: lying, start_pose: lying, control_rate: 50.0}
 events:
   - {at: 0.1, stand_up: true}
   - {at: 2.0, inhibit: false}
@@ -35,7 +35,7 @@ events:
 TOO_EARLY = """\
 name: too_early
 duration: 1.0
-parameters: {start_mode: lying, start_pose: lying, control_rate: 100.0}
+parameters: {start_mode: lying, start_pose: lying, control_rate: 50.0}
 events:
   - {at: 0.1, inhibit: false}
 """
@@ -43,7 +43,7 @@ events:
 WALKING = """\
 name: stroll
 duration: 300.0
-parameters: {control_rate: 100.0}
+parameters: {control_rate: 50.0}
 events:
   - {at: 0.1, inhibit: false}
   - {at: 0.1, command: {v_x: 0.3}}

@@ -26,7 +26,7 @@ processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 SCENARIO = """\
 name: everything
 duration: 4.4
-parameters: {gait: amble, voting: true, control_rate: 100.0}
+parameters: {gait: amble, voting: true, control_rate: 50.0}
 events:
   - {at: 0.1, inhibit: false}
   - {at: 0.1, command: {v_x: 0.3}}

@@ -54,11 +54,11 @@ events:
 
 ON_BLOCKS = """\
 name: blocks
-duration: 3.8
+duration: 3.9
 events:
   - {at: 0.1, inhibit: false}
   - {at: 0.1, command: {v_x: 0.5}}
-  - {at: 2.4, inhibit: true}
+  - {at: 2.5, inhibit: true}
 """
 
 PUSHED = """\
@@ -134,7 +134,7 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
 
     recording, (states, ticks) = load_recording(first / 'bag'), plain_run(
         scenario, control_rate=SHARED_HZ)
-    assert len(recording.joints.time) == len(ticks) == 500
+    assert len(recording.joints.time) == len(ticks) == round(5.0 * SHARED_HZ)
     np.testing.assert_array_equal(
         recording.joints.position, [state.joint_position for state in states[:-1]]
     )
@@ -282,7 +282,7 @@ def test_a_dead_node_ends_the_run_and_is_named(
     os.kill(process.pid_of('leg_transformation_fr'), signal.SIGKILL)
     assert process.wait(RUN_S) == 1
     assert re.search(r'leg_transformation_fr was ended by signal 9', process.output), process
-    assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 0.2 * SHARED_HZ
+    assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) >= 0.2 * SHARED_HZ
 
 
 @pytest.mark.parametrize(('options', 'made'), [((), 'report'), (('--no-report',), 'metrics')])
@@ -301,7 +301,7 @@ def test_ctrl_c_ends_the_run_with_a_readable_bag(
     # or the work was done when the second signal came
     assert f'{made} skipped' in process.output or 'in all\n' in process.output, process
     assert 'Traceback' not in process.output, process
-    assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 0.2 * SHARED_HZ
+    assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) >= 0.2 * SHARED_HZ
 
 
 @pytest.mark.parametrize(

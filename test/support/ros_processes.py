@@ -58,8 +58,10 @@ MARK = 'DMP_CPG_ROS_TEST'
 FORK_SERVER = fork_server_file.encode()
 """What forks executables; the process for which it does so is the next word of their command."""
 
-SHARED_HZ = 100.0
-"""Control rate of a suite beside which tests ask, command and look on; it is certified too."""
+SHARED_HZ = 50.0
+"""Control rate of a suite beside which tests ask, command and look on: certified too, and a tick
+costs what it costs at any rate.
+"""
 
 BY_ITSELF = 'looking after itself'
 """Part of the refusal of a robot that has come to a stand by itself, as it does for a moment where
