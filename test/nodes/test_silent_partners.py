@@ -6,7 +6,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -53,6 +55,13 @@ TICK = SUITE.tick_ns
 
 
 def walked(ticks: int) -> tuple[WalkingLoop, RobotState, Any]:
+    """A loop that may walk on, and its last state and tick."""
+    loop, state, tick = walked_once(ticks)
+    return deepcopy(loop), state, tick
+
+
+@cache
+def walked_once(ticks: int) -> tuple[WalkingLoop, RobotState, Any]:
     robot = PerfectTrackingRobot(load_description(SUITE.robot_file), TICK, 'standing')
     loop = WalkingLoop(robot.description, SUITE.gait, SUITE.parameters)
     state = robot.reset()
