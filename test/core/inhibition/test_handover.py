@@ -4,6 +4,9 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -19,15 +22,21 @@ from dmp_cpg_ros.robot.model_reader import load_description
 SUITE = load_suite(None, {'cmd_vel_timeout': 0.0})
 
 
-def walking(ticks: int = 500) -> tuple[WalkingLoop, PerfectTrackingRobot, RobotState]:
+@cache
+def walked() -> tuple[WalkingLoop, PerfectTrackingRobot, RobotState]:
     robot = PerfectTrackingRobot(load_description(SUITE.robot_file), SUITE.tick_ns, 'standing')
     loop = WalkingLoop(robot.description, SUITE.gait, SUITE.parameters)
     state = robot.reset()
     loop.command(0.5)
-    for _ in range(ticks):
-        state = robot.step(loop.tick(state).targets)
+    state = go(loop, robot, state, 500)
     assert loop.stop.state == 'walking'
     return loop, robot, state
+
+
+def walking() -> tuple[WalkingLoop, PerfectTrackingRobot, RobotState]:
+    """A loop and a robot that have walked for a while, once for all who walk on."""
+    loop, robot, state = walked()
+    return deepcopy(loop), deepcopy(robot), state
 
 
 def go(loop: WalkingLoop, robot: PerfectTrackingRobot, state: RobotState, ticks: int
