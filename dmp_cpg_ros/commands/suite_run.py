@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import rclpy
@@ -25,7 +25,8 @@ ENDED_WITHIN_S = 15.0
 
 def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: Path, say: Say,
               server: ForkServer, *, lock_step: bool, processes: str, stamped: bool = False,
-              view: bool = False, visualization: bool = False, respawn: bool = False
+              view: bool = False, visualization: bool = False, respawn: bool = False,
+              make_player: Callable[..., ScenarioPlayer] = ScenarioPlayer
               ) -> tuple[bool, list[str]]:
     """Run the suite from nothing to nothing.
 
@@ -59,6 +60,8 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
     respawn : bool
         Whether processes that end before their time are started again, all but the robot's: with
         it a simulated robot has lost its state.
+    make_player : callable
+        Makes the player of the scenario, from the arguments of :class:`ScenarioPlayer`.
 
     Returns
     -------
@@ -90,7 +93,7 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
             group.start_nodes(shared, arguments)
             if not respawn:
                 server.close()
-            player = ScenarioPlayer(scenario, tick_ns, lock_step, say, stamped=stamped)
+            player = make_player(scenario, tick_ns, lock_step, say, stamped=stamped)
             executor = execution.make_executor('events')
             executor.add_node(player)
             watch = SuiteWatch(executor, player, group, views, interrupted, say, shared,

@@ -47,6 +47,10 @@ STANDS_S, WALKS_S, LAST_S, AFTER_S, STOPS_S = 0.3, 2.5, 0.2, 1.5, 3.5
 walking after its end, and for the stop [s].
 """
 
+LASTS, SPEEDS = (0.1, 2.0), (0.5, 1.0)
+"""Between what the time is drawn for which a component fails [s], and from what the speed [m/s].
+"""
+
 RESTS = 3
 """For how many tenths of a second it rests until the stop, which has ``STOPS_S``, is over."""
 
@@ -84,11 +88,15 @@ class Case(NamedTuple):
     robot: str = 'robots/mini_quadruped.yaml'
 
 
-def drawn(cell: Cell, seed: int, robots: Sequence[str]) -> Case:
-    """Draw a case of a cell: leg, duration up to 2 s, sixteenth of a second, speed, robot."""
-    random = np.random.default_rng((seed, 78))
-    return Case(*cell, str(random.choice(LEGS)), round(float(0.1 * 20.0 ** random.random()), 2),
-                int(random.integers(16)) / 16.0, seed, float(random.choice((0.5, 1.0))),
+def drawn(cell: Cell, seed: int, robots: Sequence[str], lasts: Sequence[float] = LASTS,
+          speeds: Sequence[float] = SPEEDS) -> Case:
+    """Draw a case of a cell: leg, duration between two [s], sixteenth of a second, speed [m/s],
+    robot.
+    """
+    random, (least, most) = np.random.default_rng((seed, 78)), lasts
+    return Case(*cell, str(random.choice(LEGS)),
+                round(float(least * (most / least) ** random.random()), 2),
+                int(random.integers(16)) / 16.0, seed, float(random.choice(list(speeds))),
                 str(random.choice(list(robots))))
 
 
@@ -229,6 +237,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--draws', type=at_least_one, metavar='N',
                         help='draw N cases of each cell, and count those that fall or stop')
     parser.add_argument('--seed', type=int, default=0, help='of the first case of each cell')
+    parser.add_argument('--lasts', nargs=2, type=float, default=LASTS, metavar='S',
+                        help='between what the time of a failure is drawn (default: 0.1 2)')
+    parser.add_argument('--speeds', nargs='+', type=float, default=SPEEDS, metavar='M/S',
+                        help='from what the speed is drawn (default: 0.5 1)')
     parser.add_argument('--robots', nargs='+', default=[Case._field_defaults['robot']],
                         metavar='FILE', help='of which one is drawn')
     return run_command(parser, arguments, _study)
@@ -238,7 +250,8 @@ def _study(options: argparse.Namespace, _: Any) -> int:
     cells = [(gait, component, kind) for gait in options.gaits
              for component in options.components for kind in options.kinds]
     seeds = range(options.seed, options.seed + (options.draws or 0))
-    cases = {cell: [drawn(cell, seed, options.robots) for seed in seeds]
+    cases = {cell: [drawn(cell, seed, options.robots, options.lasts, options.speeds)
+                    for seed in seeds]
              if options.draws else [Case(*cell)] for cell in cells}
     outcomes = study([case for of in cases.values() for case in of],
                      Workers(options.workers, options.cluster))

@@ -327,7 +327,7 @@ def test_a_change_that_cannot_be_is_refused_with_the_reason(ros: Ros, started: R
     for values, reason in (({'alpha_r': 'x'}, 'type'), ({'alpha_r': 1e9}, 'alpha_r'),
                            ({'alpha_r': math.nan}, 'alpha_r'), ({'count': 6}, 'upper = 5.0'),
                            ({'alpha_r': 7.0}, 'certificate'), ({'gains': [math.nan]}, 'gains'),
-                           ({'max_speed': 0.5}, 'read-only')):
+                           ({'max_speed': 0.5}, 'what may change is alpha_r, count')):
         accepted, said = change(ros, **values)
         assert not accepted and reason in said, (values, said)
     assert change(ros, count=6, upper=6.0)[0]  # together they fit

@@ -122,6 +122,12 @@ class ParameterChanges:
         if entry.value.type not in VALUE_TYPES:
             raise ParameterError(f"the value of '{entry.name}' has the type {entry.value.type}; "
                                  f'valid are {min(VALUE_TYPES)} to {max(VALUE_TYPES)}')
+        own = self._node.get_parameter(entry.name).get_parameter_value()
+        if entry.value != own and self._node.describe_parameter(entry.name).read_only:
+            raise ParameterError(
+                f"'{entry.name}' is read-only while {self._node.get_name()} runs: start it with "
+                f'{entry.name}:=...; what may change is '
+                f'{", ".join(sorted(self._table.changeable)) or "nothing"}')
 
     def _to_judge(self, entries: Sequence[Any]) -> Step | None:
         """What has to be computed before a change can be judged at once."""
