@@ -28,7 +28,7 @@ time of the last one [s].
 QUIET, QUIET_S = 0.5, 1.5
 """Share of stops and starts after which nothing is asked for a while, and how long [s]."""
 
-WALKS_S, RESTS_S, STANDS_S, RECOVERS_S = 3.0, 4.0, 4.0, 16.0
+WALKS_S, RESTS_S, STANDS_S, RECOVERS_S = 3.0, 5.0, 4.0, 16.0
 """How long a robot is given at the end to walk, to rest, to stand up, and to recover [s]."""
 
 FAILS = (0.02, 0.3)

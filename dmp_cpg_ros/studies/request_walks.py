@@ -166,8 +166,9 @@ class Judge:
         self._checked = walked.checked
         accepted = [answer.time_ns * 1e-9 for answer in walked.answers if answer.accepted]
         others = [at for at, kind, _ in case['events'] if kind in ('cycle', 'votes', 'at_once')]
-        self._moved = [at + value.get('for_s', 0.1) for at, kind, value in case['events']
-                       if kind in ('push', 'fail')]
+        self._moved = [at + (value.get('for_s', 0.1) if kind == 'fail' else 0.0)
+                       for at, kind, value in case['events']
+                       if kind in ('push', 'fail', 'cycle')]  # who is back has forgotten footholds
         pushes = [at for at, kind, _ in case['events'] if kind in ('push', 'fail')]
         self._changes = np.array(sorted([*accepted, *others, *pushes]))
         self._states = [(event.time, event.message) for event in recording.inhibition]
@@ -256,7 +257,7 @@ class Judge:
             if found is None:
                 continue
             predicted, bound = float(found[1]), float(found[2] or inf)
-            if later <= at + max(predicted, self._tick_s) + self._tick_s:
+            if min(later, self._end) <= at + max(predicted, self._tick_s) + self._tick_s:
                 continue
             self._checked['stops' if stop else 'starts'] += 1
             done = next((time for time, word in self._states
@@ -306,7 +307,7 @@ class Judge:
         walks = [word for time, word in self._states if time < stop_s]
         if walks[-1:] not in (['walking'], ['free']):
             yield f'does not walk at the end: {walks[-1:]}, {self._modes[-1:]}'
-        elif self._states[-1][1] != 'at_rest':
+        elif self._states[-1][1] != 'at_rest' and self._rests_by() <= self._end:
             yield f'does not rest at the end: {self._states[-1]}'
         time = self._recording.odometry.time
         inside = (time > stop_s - 0.5 * WALKS_S) & (time < stop_s)
@@ -315,6 +316,12 @@ class Judge:
                       np.array([stop_s]))[0, 0]
         if len(pace) and pace.mean() < 0.5 * wanted:
             yield f'walks at {pace.mean():.3f} m/s at the end, asked for {wanted:.3f} m/s'
+
+
+    def _rests_by(self) -> float:
+        """When it rests by the last promise of that [s]."""
+        return max((answer.time_ns * 1e-9 + float(found[1]) for answer in self._walked.answers
+                    if answer.value is True and (found := REST.search(answer.text))), default=0.0)
 
 
 def _lasting(events: Sequence[tuple[float, str]], end: float

@@ -4,7 +4,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import signal
+import threading
+from collections.abc import Iterator
 from importlib import import_module
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +22,7 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from ros_processes import Ros
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
@@ -24,11 +31,16 @@ from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.inhibition import InhibitionNode
+from dmp_cpg_ros.nodes.messages.inhibition import inhibition_state
+from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
 from dmp_cpg_ros.nodes.reference_filter import ReferenceFilter
 from dmp_cpg_ros.suite_table import KINDS
 
 ros, ros_domain = ros_processes.ros, ros_processes.ros_domain
+
+BURST, LARGE = 1900, JointState(name=['x' * 1000] * 20)
+"""So many of these messages no socket has room for."""
 
 
 def made(ros: Ros, node_class: type[SuiteNode], **parameters: Any) -> Any:
@@ -89,6 +101,71 @@ def test_a_robot_whose_gate_is_open_goes_on_when_it_is_activated_again(ros: Ros)
         ros.spin_until(lambda then=then: robot.health.stamp_ns > then)
         robot.trigger_deactivate()
         robot.trigger_activate()
+
+
+def _read(domain: int, told: Any, wanted: dict[str, int]) -> None:
+    """Read topics in another process, tell that it does, and then how much has come of each."""
+    with ros_processes.joined(domain) as reader:
+        heard = {name: reader.collect(interface(name).type, name, interface(name).recorder_qos,
+                                      raw=True) for name in wanted}
+        told.send('reads')
+
+        def counts() -> dict[str, int]:
+            return {name: len(messages) for name, messages in heard.items()}
+
+        with contextlib.suppress(pytest.fail.Exception):
+            reader.spin_until(lambda: counts() == wanted)
+        told.send(counts())
+
+
+@contextlib.contextmanager
+def reading(domain: int, **wanted: int) -> Iterator[tuple[Any, int]]:
+    """A process that reads, with what it tells and its number."""
+    apart = get_context('spawn')
+    told, tells = apart.Pipe()
+    process = apart.Process(target=_read, args=(domain, tells, wanted), daemon=True)
+    process.start()
+    assert told.recv() == 'reads' and process.pid is not None
+    yield told, process.pid
+    process.join()
+
+
+def publisher_of(ros: Ros, node: Any, topic: str) -> Any:
+    """A node's publisher, once it is read."""
+    publisher = next(of for of in node.publishers if of.topic.endswith(topic))
+    ros.spin_until(lambda: publisher.get_subscription_count() > 0)
+    return publisher
+
+
+def test_what_a_node_has_said_is_heard_before_its_publishers_go(
+        ros: Ros, ros_domain: int) -> None:
+    """A reader that has lost something of a burst asks for it again, and had nobody to ask."""
+    with reading(ros_domain, canonical_state=BURST) as (told, _):
+        node = made(ros, CanonicalOscillators)
+        node.start()
+        publisher = publisher_of(ros, node, 'canonical_state')
+        for _ in range(BURST):
+            publisher.publish(LARGE)
+        clean_up(node)
+        assert told.recv() == {'canonical_state': BURST}
+
+
+def test_in_lock_step_a_recorder_that_lags_hears_every_state(ros: Ros, ros_domain: int) -> None:
+    """A latched topic keeps its last message only, and cannot repeat the one before."""
+    with reading(ros_domain, inhibition_state=2, canonical_state=BURST) as (told, pid):
+        node = made(ros, InhibitionNode, lock_step=True)
+        node.start()
+        publisher_of(ros, node, 'inhibition_state')
+        flood = ros.node.create_publisher(
+            JointState, 'canonical_state', interface('canonical_state').publisher_qos)
+        ros.spin_until(lambda: flood.get_subscription_count() > 1)
+        os.kill(pid, signal.SIGSTOP)
+        for _ in range(BURST):
+            flood.publish(LARGE)
+        threading.Timer(0.3, os.kill, (pid, signal.SIGCONT)).start()
+        for word in ('waiting', 'captured'):
+            node._told._state_publisher.publish(inhibition_state(1, word, {}))
+        assert told.recv() == {'inhibition_state': 2, 'canonical_state': BURST}
 
 
 @pytest.mark.parametrize('node_class', [ReferenceFilter, InhibitionNode])

@@ -152,9 +152,22 @@ class ModeManager:
 
     def feedback(self, mode: ModeState, state: RobotState) -> PostureFeedback:
         """What the legs get while the balance controller does not act."""
+        state = self._as_moved(mode, state)
         torque = self._sense.carrying_torque(state, self._carried(mode))
         return PostureFeedback(torque, np.zeros((4, 3)), np.zeros((4, 2)), np.zeros(3),
                                self.command(mode), state.joint_position.copy())
+
+    def _as_moved(self, mode: ModeState, state: RobotState) -> RobotState:
+        """State in which legs that are not felt are where the movement has them: a leg that begins
+        anew would begin where its joints were when they were felt last.
+        """
+        if state.felt_legs is None or mode.mode == 'damped':
+            return state
+        name, share = (mode.movements[0], self._share(mode)) if mode.movements else ('fold', 1.0)
+        planned = self.movements.named(name).posture(share, state.joint_position)
+        felt = np.repeat(state.felt_legs, len(planned) // len(state.felt_legs))
+        return replace_unchecked(
+            state, joint_position=np.where(felt, state.joint_position, planned))
 
     def _carried(self, state: ModeState) -> float:
         """Share of the weight that the legs are to carry by feed-forward in a movement."""

@@ -132,6 +132,15 @@ class Movement:
     path: Array | None = None
     support: tuple[float, float] = (0.0, 0.0)
 
+    def posture(self, share: float, begin: Array) -> Array:
+        """Joint angles (12,) of a movement that began at others [rad], after a share of its
+        duration.
+        """
+        gone = min(max(share, 0.0), 1.0)
+        if self.path is not None:
+            return self.path[round(gone * (len(self.path) - 1))]
+        return begin + float(minimum_jerk(np.array(gone))) * (self.goal - begin)
+
 
 class Movements:
     """All movements of one robot, by name.

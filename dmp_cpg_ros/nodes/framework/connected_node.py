@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any
 
+from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
@@ -22,6 +24,7 @@ from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.interfaces import (
     PUBLISHER_DEPTH,
     REPEATED,
+    SELDOM,
     Interface,
     expected_count,
     interface,
@@ -30,6 +33,11 @@ from dmp_cpg_ros.nodes.messages.interfaces import (
 
 WATCH_EVERY_S = 0.5
 """How often strangers are looked for [s]."""
+
+
+HEARD_WITHIN_S = 1.0
+"""How long all readers together may take to hear the last that a node has said [s]; one that was
+killed has not acknowledged anything."""
 
 
 class ConnectedNode(GuardedLifecycleNode):
@@ -87,8 +95,10 @@ class ConnectedNode(GuardedLifecycleNode):
         if topic.latched and self.local is not None and not topic.name.startswith('~'):
             self.local.latch(topic.name)
             self._undo.append(partial(self.local.unlatch, topic.name))
-        return SuitePublisher(
-            publisher, topic.name, self.local, self._said if repeated else None)
+        # In real time nobody waits for a recorder that lags.
+        waits = topic.latched and self.lock_step and name in SELDOM
+        return SuitePublisher(publisher, topic.name, self.local, self._said if repeated else None,
+                              HEARD_WITHIN_S if waits else 0.0)
 
     def listen(self, topic: str | Interface, callback: Callable[[Any], None], *,
                command: bool = False, raw: bool = False, wakes: bool = True,
@@ -198,7 +208,12 @@ class ConnectedNode(GuardedLifecycleNode):
         self.destroy_subscription(subscription)
 
     def destroy_entities(self) -> None:
-        """Destroy the publishers, subscriptions and services of :meth:`configure`."""
+        """Destroy the publishers, subscriptions and services of :meth:`configure`, once what was
+        said has been heard: what a reader has to be sent again goes with its publisher.
+        """
+        end_s = time.monotonic() + HEARD_WITHIN_S
+        for _, publisher in self._outputs[1:] if self.context.ok() else ():
+            publisher.wait_for_all_acked(Duration(seconds=max(0.0, end_s - time.monotonic())))
         for undo in reversed(self._undo):
             undo()
         self._undo, self._inputs, self._not_waking = [], [], {}

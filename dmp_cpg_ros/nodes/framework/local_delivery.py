@@ -14,6 +14,7 @@ from collections.abc import Callable, Collection, Iterable
 from functools import partial
 from typing import Any
 
+from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 
 from dmp_cpg_ros.nodes.messages.cdr import Serialized
@@ -101,12 +102,16 @@ class SuitePublisher:
         The process's delivery, where several nodes share it.
     said : list of callable (), optional
         Where to put what publishes a message once more.
+    patience_s : float
+        How long all readers outside may take to hear the last message before there is another
+        one: a latched topic keeps one only, and has nothing to repeat for who lags [s].
     """
 
     def __init__(self, publisher: Publisher, topic: str, local: LocalDelivery | None,
-                 said: list[Callable[[], None]] | None = None) -> None:
+                 said: list[Callable[[], None]] | None = None, patience_s: float = 0.0) -> None:
         """Keep the parts."""
         self._publisher, self._topic, self._local, self._said = publisher, topic, local, said
+        self._patience = Duration(seconds=patience_s) if patience_s else None
 
     def publish(self, message: Any) -> None:
         """Publish outside, then inside."""
@@ -115,6 +120,8 @@ class SuitePublisher:
         self._publish(message)
 
     def _publish(self, message: Any) -> None:
+        if self._patience is not None:
+            self._publisher.wait_for_all_acked(self._patience)
         self._publisher.publish(message.serialized if isinstance(message, Serialized) else message)
         if self._local is not None:
             self._local.publish(self._topic, message)

@@ -291,6 +291,11 @@ REPEATED = ('reference', 'canonical_state', 'posture_feedback', 'joint_targets',
             'inhibition_gains')
 """What nodes publish again in lock-step when they hear the trigger of their last tick again."""
 
+SELDOM = ('inhibition_state', 'drive_mode', 'body_mode')
+"""What is latched, recorded, and told when something begins: a recording without one of them tells
+another story.
+"""
+
 EVERY_TICK = ('joint_states', 'imu', 'ground_truth', 'foot_contacts', '/clock', 'reference',
               'canonical_state', 'posture_feedback', 'joint_targets')
 """What comes anew at every tick, or nearly so."""
