@@ -169,6 +169,8 @@ class Judge:
         self._moved = [at + (value.get('for_s', 0.1) if kind == 'fail' else 0.0)
                        for at, kind, value in case['events']
                        if kind in ('push', 'fail', 'cycle')]  # who is back has forgotten footholds
+        self._failing = [(at, at + value['for_s']) for at, kind, value in case['events']
+                         if kind == 'fail']
         pushes = [at for at, kind, _ in case['events'] if kind in ('push', 'fail')]
         self._changes = np.array(sorted([*accepted, *others, *pushes]))
         self._states = [(event.time, event.message) for event in recording.inhibition]
@@ -257,7 +259,9 @@ class Judge:
             if found is None:
                 continue
             predicted, bound = float(found[1]), float(found[2] or inf)
-            if min(later, self._end) <= at + max(predicted, self._tick_s) + self._tick_s:
+            fails = any(begin < at + predicted and at < end + PUSHED_S
+                        for begin, end in self._failing)
+            if fails or min(later, self._end) <= at + max(predicted, self._tick_s) + self._tick_s:
                 continue
             self._checked['stops' if stop else 'starts'] += 1
             done = next((time for time, word in self._states

@@ -21,11 +21,14 @@ from dmp_cpg_ros.core.modes.falls import (
     FallParameters,
     FallState,
 )
+from dmp_cpg_ros.core.modes.leg_control import LegMotion
 from dmp_cpg_ros.core.modes.manager import ModeManager, ModeParameters, ModeState
 from dmp_cpg_ros.core.modes.motion_library import MOVEMENT_NAMES, Movements
 from dmp_cpg_ros.core.modes.requests import REQUESTS, request
+from dmp_cpg_ros.core.primitives.spring_damper import SpringState
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive, LegState
 from dmp_cpg_ros.layouts import MODE_ROWS, MOVEMENT_ROWS, command_rows, read_command_rows
 
 ROBOT = quadruped()
@@ -325,3 +328,32 @@ def test_the_carrying_torque_balances_weight_without_a_moment() -> None:
         moment += np.cross(leg.foot_in_base(q) - ROBOT.com_in_base, f)
     np.testing.assert_allclose(force, ROBOT.mass * GRAVITY * up, rtol=1e-6, atol=1e-4)
     np.testing.assert_allclose(moment, 0.0, atol=1e-4)
+
+
+@pytest.mark.parametrize('share', [0.1, 0.5, 0.9])
+def test_a_leg_that_begins_unfelt_in_a_movement_begins_where_the_movement_has_it(share: float
+                                                                                 ) -> None:
+    """Its joints were felt last while the robot stood, and it lies or rises since."""
+    machine = Machine('lying').go(0.1, FOLDED)
+    path = machine.modes.movements.named('rise').path
+    stale = replace(standing_state(ROBOT), felt_legs=(True, True, True, False))
+    told = machine.modes.feedback(machine.state, stale).measured
+    assert np.allclose(told[9:], path[0, 9:], atol=1e-9)
+    assert (told[:9] == stale.joint_position[:9]).all()
+    assert machine.ask('stand_up')[0]
+    machine.go(share * machine.modes.movements.named('rise').duration, FOLDED)
+    feedback = machine.modes.feedback(machine.state, stale)
+    anew = LegMotion(slice(9, 12), machine.modes.movements, LegPrimitive(
+        'rr', ROBOT, LegParameters()).transformation)
+    _, leg, goal, _ = anew.step(None, LegState(SpringState(np.zeros(3), np.zeros(3)), 0.0),
+                                feedback.command, feedback.measured[9:], 0.0)
+    here = path[round(share * (len(path) - 1)), 9:]
+    assert np.abs(leg.joints.position - here).max() < 0.05
+    assert np.abs(goal - here).max() < 0.05 < np.abs(stale.joint_position[9:] - path[0, 9:]).max()
+
+
+def test_what_is_not_felt_of_a_robot_that_has_fallen_is_what_was_felt_last() -> None:
+    fallen = Machine('damped').go(0.1, LEFT)
+    stale = replace(standing_state(ROBOT), felt_legs=(False, True, True, True))
+    told = fallen.modes.feedback(fallen.state, stale).measured
+    assert (told == stale.joint_position).all()
