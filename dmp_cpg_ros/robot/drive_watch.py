@@ -196,8 +196,5 @@ class DriveWatch:
             self._lame_ns = np.where(lame, now, self._lame_ns)
         elif not self.lame:
             return
-        lately, before = now - self._lame_ns < WELL_NS, self.lame
+        lately = now - self._lame_ns < WELL_NS
         self.lame = tuple(leg for leg, of in zip(LEGS, lately, strict=True) if of)
-        if self.cuts:  # that it gave nothing while it was cut off is no sign against a leg
-            back = [leg in before and leg not in self.lame for leg in LEGS]
-            self._means[:, np.repeat(back, len(self._names) // len(LEGS))] = 0.0

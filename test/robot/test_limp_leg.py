@@ -95,36 +95,6 @@ def test_a_weak_leg_and_a_push_are_walked_through_without_a_word(share: float) -
         assert not walk.watchdog.drives.failing and not walk.watchdog.fallback
 
 
-def test_a_leg_that_was_cut_off_is_judged_by_what_it_gives_once_its_power_is_back() -> None:
-    robot = MujocoRobot()
-    state, still = robot.reset(), np.zeros(12)
-    watch, kd = DriveWatch(robot.description), np.tile(robot.description.kd, 4)
-    watch.cuts = True
-    leg, asked = np.repeat([of == 'fl' for of in LEGS], 3), np.tile(robot.description.kp, 4) * 0.1
-    targets, tick = JointTargets(state.joint_position + 0.1, still, still), 0
-
-    def run(seconds: float, powered: bool, speed: float, until_lame: bool | None = None) -> bool:
-        """Whether the leg was lame in some of the time, which ends early where it is, or not."""
-        nonlocal tick
-        lame = False
-        for _ in range(round(seconds * 1e9 / robot.tick_ns)):
-            tick += 1
-            moves = np.where(leg, speed, 0.0)
-            effort = np.where(leg & (not powered), 0.0, asked - kd * moves)
-            watch.see(replace(state, time_ns=tick * robot.tick_ns, joint_velocity=moves,
-                              joint_effort=effort))
-            watch.tell(tick * robot.tick_ns, targets)
-            lame = lame or bool(watch.lame)
-            if bool(watch.lame) == until_lame:
-                break
-        return lame
-
-    assert not run(1.5, True, 0.0)
-    assert run(0.5, False, 1.0, until_lame=True) and watch.lame == ('fl',)
-    run(1.5, False, 0.0, until_lame=False)
-    assert not watch.lame and not run(1.5, True, 1.0)
-
-
 def test_drives_that_never_reported_a_torque_are_not_judged() -> None:
     robot = MujocoRobot()
     state, still = robot.reset(), np.zeros(12)
