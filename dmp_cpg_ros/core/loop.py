@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits, quarter_weight
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.gait.running import RunningGait, limiting_gaits
+from dmp_cpg_ros.core.gait.running import RunningGait, limits_on_the_way
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead, next_gait
@@ -132,11 +132,11 @@ class WalkingLoop:
         self._limits: ContactLimits | None = None
         self._barring = 'standing'
 
-    def _take(self, p: SuiteParameters, wanted: Gait) -> None:
+    def _take(self, p: SuiteParameters, wanted: Gait, cadence: float | None = None) -> None:
         """Make the parts anew that may get other parameters and hold nothing else."""
-        gaits = limiting_gaits(p.gait_choice, wanted.name, self._reader.named,
-                               p.canonical.cadence_scale)
-        self.gate.follow(p.reference, gaits)
+        gaits, passing, passing_s = limits_on_the_way(
+            p.gait_choice, wanted.name, self._reader.named, p.canonical.cadence_scale, cadence)
+        self.gate.follow(p.reference, gaits, passing, passing_s)
         self.parameters = p
         self.reference = ReferenceSystem(
             p.reference, self.canonical.scale.hip_radius, Governor(gaits, self.canonical.scale))
@@ -265,7 +265,7 @@ class WalkingLoop:
                          (*walked, canon.wanted)).verdict()
         if verdict.accepted:
             p = proposed.parameters
-            self._take(p, wanted)
+            self._take(p, wanted, canon.cadence_scale)
             self.canonical = self.canonical.with_parameters(
                 p.canonical, p.gait_change, p.gait_choice)
             self.canon = replace_unchecked(canon, wanted=wanted)

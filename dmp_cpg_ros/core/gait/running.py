@@ -105,6 +105,33 @@ def limiting_gaits(parameters: GaitChoiceParameters, name: str, named: Callable[
     return tuple(named(each).limiting(cadence_scale) for each in names)
 
 
+def limits_on_the_way(parameters: GaitChoiceParameters, name: str, named: Callable[[str], Gait],
+                      wanted: float, acting: float | None = None
+                      ) -> tuple[tuple[Gait, ...], tuple[Gait, ...], float]:
+    """Gaits whose limits commands are to keep while the cadence moves, which hips and legs have to
+    follow all the way: the limits between two cadences are not below those of both.
+
+    Parameters
+    ----------
+    parameters, name, named
+        As for :func:`limiting_gaits`.
+    wanted, acting : float
+        Factors on the cadence; the one that acts is the wanted one where it is not given.
+
+    Returns
+    -------
+    wanted, acting : tuple of Gait
+        At both cadences; none for the latter where it has arrived.
+    float
+        Time until it arrives [s].
+    """
+    gaits = limiting_gaits(parameters, name, named, wanted)
+    if acting is None or acting == wanted:
+        return gaits, (), 0.0
+    return (gaits, limiting_gaits(parameters, name, named, acting),
+            abs(acting - wanted) / CADENCE_RATE)
+
+
 def chosen_gait(parameters: GaitChoiceParameters, present: str, r: Array, scale: BodyScale) -> str:
     """Gait for a reference.
 

@@ -37,7 +37,8 @@ the hip alone gives to a foot under it.
 
 A cadence that is slower than the gait's by a factor c < 1 has longer strides, u β/(c f), which
 legs reach no farther for. They stay within those of the gait at its highest speed. At a quicker
-one the same hips swing the legs c times as often: commands keep to the inequality with c f.
+one the same hips swing the legs c times as often: commands keep to the inequality with c f. While
+the cadence moves from one factor to another they keep to the limits at both.
 """
 
 from __future__ import annotations

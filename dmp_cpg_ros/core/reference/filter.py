@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -85,12 +86,25 @@ class CommandGate:
         self._received_ns, self._fresh = 0, False
         self.follow(parameters, gaits)
 
-    def follow(self, parameters: ReferenceParameters, gaits: Sequence[Gait]) -> None:
-        """Take new limits; they hold from the next :meth:`at` on, whatever was accepted when."""
-        self.parameters = parameters
-        scale, self._fastest = self._scale, None
-        if gaits and scale is not None:
-            self._fastest = max(gaits, key=lambda gait: gait.highest(scale))
+    def follow(self, parameters: ReferenceParameters, gaits: Sequence[Gait],
+               passing: Sequence[Gait] = (), passing_s: float = 0.0) -> None:
+        """Take new limits; they hold from the next :meth:`at` on, whatever was accepted when.
+
+        Parameters
+        ----------
+        parameters : ReferenceParameters
+            Limits and timeout.
+        gaits : sequence of Gait
+            Whose limits are kept, at the cadence that is wanted.
+        passing : sequence of Gait
+            The same at the cadence that acts: as long as it moves, commands keep to both.
+        passing_s : float
+            For how long it moves [s].
+        """
+        self.parameters, scale = parameters, self._scale
+        self._passing_ns, self._passed_ns = round(1e9 * passing_s), inf
+        self._ends = () if scale is None else tuple(
+            max(each, key=lambda gait: gait.highest(scale)) for each in (gaits, passing) if each)
         self._limit()
 
     def accept(self, v_x: float, v_y: float, gamma: float) -> None:
@@ -113,22 +127,27 @@ class CommandGate:
         self._limit()
 
     def _limit(self) -> None:
-        """Bring the command within its range and the limits of the fastest gait."""
-        p, gait, (v_x, v_y, gamma) = self.parameters, self._fastest, self.asked
-        self._limited = in_range = (clamped(v_x, -p.max_speed, p.max_speed),
-                                    clamped(v_y, -p.max_lateral_speed, p.max_lateral_speed),
-                                    clamped(gamma, -p.max_turn_rate, p.max_turn_rate))
-        self._cut_by = '' if in_range == self.asked else 'range'
-        if gait is not None and self._scale is not None:
-            self._limited = gait.limited(in_range, self._scale, p.max_curve * gait.two_sided)
-            if self._limited != in_range:
-                self._cut_by = 'gait'
+        """Bring the command within its range, and then within the limits of the fastest gait at
+        the cadence that is wanted, and at the one that acts.
+        """
+        p, (v_x, v_y, gamma) = self.parameters, self.asked
+        limited = in_range = (clamped(v_x, -p.max_speed, p.max_speed),
+                              clamped(v_y, -p.max_lateral_speed, p.max_lateral_speed),
+                              clamped(gamma, -p.max_turn_rate, p.max_turn_rate))
+        cut_by = '' if in_range == self.asked else 'range'
+        within = [(limited, cut_by)]
+        for gait in self._ends:
+            assert self._scale is not None
+            limited = gait.limited(limited, self._scale, p.max_curve * gait.two_sided)
+            within.append((limited, cut_by if limited == in_range else 'gait'))
+        self._on_the_way, self._arrived = within[-1], within[:2][-1]
 
     def at(self, time_ns: int) -> tuple[float, float, float]:
         """Command that acts at a tick, with its stamp on the robot's clock [ns]: (v_x, v_y, γ)."""
         if self._fresh:
             self._fresh, self._received_ns = False, time_ns
         self._received_ns = min(self._received_ns, time_ns)
+        self._passed_ns = min(self._passed_ns, time_ns + self._passing_ns)
         command, self.limited_by = self._acting(time_ns)
         return command
 
@@ -142,7 +161,7 @@ class CommandGate:
         silent = 0.0 < timeout < (time_ns - self._received_ns) * 1e-9
         if silent and not self._fresh:
             return (0.0, 0.0, 0.0), 'timeout'
-        return self._limited, self._cut_by
+        return self._on_the_way if time_ns < self._passed_ns else self._arrived
 
 
 class ReferenceSystem:

@@ -28,7 +28,7 @@ from dmp_cpg_ros.core.gait.running import (
     CADENCE_RATE,
     GaitChoiceParameters,
     RunningGait,
-    limiting_gaits,
+    limits_on_the_way,
 )
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
@@ -322,13 +322,13 @@ class Certified:
 
     def limit(self, commands: CommandGate) -> None:
         """Let commands follow the limits, those of the gait included."""
-        commands.follow(self._node.parameters_of(ReferenceParameters), self._limiting_gaits())
+        commands.follow(self._node.parameters_of(ReferenceParameters), *self._limits())
 
     def reference(self) -> ReferenceSystem:
         """The reference's filters, with the limits of the gait that is wanted."""
         return ReferenceSystem(
             self._node.parameters_of(ReferenceParameters), self._scale.hip_radius,
-            Governor(self._limiting_gaits(), self._scale))
+            Governor(self._limits()[0], self._scale))
 
     @property
     def wanted(self) -> Gait | None:
@@ -338,11 +338,12 @@ class Certified:
             return None
         return self.gaits.named(of(suite.GaitParameters).gait)
 
-    def _limiting_gaits(self) -> tuple[Gait, ...]:
+    def _limits(self) -> tuple[tuple[Gait, ...], tuple[Gait, ...], float]:
         of = self._node.parameters_of
-        return limiting_gaits(
+        return limits_on_the_way(
             of(GaitChoiceParameters), of(suite.GaitParameters).gait, self.gaits.named,
-            of(CanonicalParameters).cadence_scale)
+            of(CanonicalParameters).cadence_scale,
+            self._acting().cadence if self._node.configured else None)
 
 
 def certificate_words(certificate: Certificate) -> str:

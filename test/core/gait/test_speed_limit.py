@@ -20,7 +20,13 @@ from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.gait import BACKWARD_WEIGHT, ONE_SIDED_WEIGHT, Gait
-from dmp_cpg_ros.core.gait.running import HASTE, GaitChoiceParameters, limiting_gaits
+from dmp_cpg_ros.core.gait.running import (
+    HASTE,
+    GaitChoiceParameters,
+    approached,
+    limiting_gaits,
+    limits_on_the_way,
+)
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit, swing_acceleration, within_limit
 from dmp_cpg_ros.core.gait.transition import (
     CHANGING,
@@ -38,7 +44,7 @@ from dmp_cpg_ros.core.transformation.leg import (
     LegPrimitive,
     body_scale,
 )
-from dmp_cpg_ros.studies.walking_trials import Walk
+from dmp_cpg_ros.studies.walking_trials import Walk, is_there
 
 ROBOT = quadruped()
 SCALE = body_scale(ROBOT)
@@ -159,6 +165,47 @@ def test_commands_are_limited_to_what_hips_can_swing_at_a_quicker_cadence(gait: 
         assert limiting.omega(0.5, scale) == of.omega(0.5, scale)  # as the governor counts
         before = most
     assert before < of.highest(scale)
+
+
+@given(gait=st.sampled_from(sorted(GAITS)), before=st.floats(0.7, 4.0), after=st.floats(0.7, 4.0),
+       begin_s=st.floats(-5.0, 5.0))
+def test_commands_keep_the_limits_of_every_cadence_on_the_way_from_one_to_another(
+        gait: str, before: float, after: float, begin_s: float) -> None:
+    scale, dt_ns = replace(SCALE, swing=150.0), 50_000_000
+    p, way = ReferenceParameters(max_speed=9.0, cmd_vel_timeout=0.0), limits_on_the_way(
+        GaitChoiceParameters(), gait, GAITS.__getitem__, after, before)
+    gate, time_ns, acting = CommandGate(p, scale), round(1e9 * begin_s), before
+    gate.accept(9.0, 0.0, 0.0)
+    gate.follow(p, *way)
+    while acting != after:
+        time_ns, acting = time_ns + dt_ns, approached(acting, after, dt_ns * 1e-9)
+        most = scale.speed(GAITS[gait].limiting(acting).highest(scale))
+        foreseen = gate.foreseen(time_ns)
+        assert gate.at(time_ns) == foreseen
+        assert foreseen[0] <= most * (1.0 + 1e-9)
+    assert gate.at(time_ns + 2 * dt_ns)[0] == pytest.approx(
+        scale.speed(GAITS[gait].limiting(after).highest(scale)))
+
+
+def test_the_limits_of_a_cadence_that_moves_end_on_a_clock_that_was_set_back() -> None:
+    scale, p = replace(SCALE, swing=150.0), ReferenceParameters(cmd_vel_timeout=0.0)
+    gate = CommandGate(p, scale)
+    gate.accept(3.5, 0.0, 0.0)
+    gate.follow(p, *limits_on_the_way(
+        GaitChoiceParameters(), 'trot', GAITS.__getitem__, 1.0, 4.0))
+    quick = gate.at(10**12)
+    assert gate.at(0) == quick == gate.at(5 * 10**9)
+    assert gate.at(6 * 10**9 + 1)[0] > quick[0]
+
+
+@pytest.mark.skipif(not is_there('robots/go1'), reason='the model of Go1 is not installed')
+def test_a_robot_stays_up_while_its_cadence_comes_down_from_a_quick_one() -> None:
+    """It fell within 1.6 s, told to go faster than its hips could swing the legs yet."""
+    run = Walk('trot', 'robots/go1', seed=3, values=(('cadence_scale', 4.0),))
+    run.loop.command(3.5)
+    assert run.walk(3.0)
+    assert run.loop.change({'cadence_scale': 1.0}) == ''
+    assert run.walk(3.0)
 
 
 @pytest.mark.parametrize(('gait', 'velocity'), [
