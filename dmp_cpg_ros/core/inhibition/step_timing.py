@@ -15,7 +15,8 @@ legs go through their cycles κ times as fast while the room of the capture poin
 
     κ = 1 + (QUICKEST − 1) (1 − sat(room / DISTURBED)) :
 
-from what standing legs can just bear to a capture point on the edge of the support. κ rises within
+from what standing legs can just bear to a capture point on the edge of the support, but no farther
+than hips can swing the legs at the speed of the body (:func:`quickest`). κ rises within
 ``RISING`` and falls at ``SLOWING``: later steps are early too.
 
 ω is common to all oscillators. In the frame that turns with it nothing changes, so that phase
@@ -27,7 +28,13 @@ it was computed for.
 
 from __future__ import annotations
 
+from math import hypot, inf, pi
+
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.speed_limit import swing_acceleration
 from dmp_cpg_ros.core.inhibition.caution import DISTURBED
+from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.vec3 import Pair
 
 QUICKEST = 2.5
 """Largest factor on the cadence: legs that swing faster come down no more where they are to."""
@@ -41,15 +48,46 @@ SLOWING = 2.0
 """Rate at which the factor falls again [1/s]: a step or two."""
 
 
-def quickened(quickness: float, left: float | None, dt: float) -> float:
+def quickened(quickness: float, left: float | None, dt: float, most: float = QUICKEST) -> float:
     """Factor κ on the cadence after a tick of dt [s], in [1, ``QUICKEST``], from the one before
-    and the room, where it is known and may act.
+    and the room, where it is known and may act; it does not rise above the most that hips allow.
     """
     slower = max(1.0, quickness - SLOWING * dt)
     if left is None:
         return slower
     wanted = 1.0 + (QUICKEST - 1.0) * (1.0 - min(max(left / DISTURBED, 0.0), 1.0))
+    wanted = min(wanted, most)
     return max(slower, min(wanted, quickness + (QUICKEST - 1.0) * dt / RISING))
+
+
+def quickest(network: GaitNetwork, quickness: float, r: Array, body: Pair) -> float:
+    """Factor κ up to which hips can swing the legs, 6 u κ f/(1 − β)² ≤ τ l/I, as commands keep to
+    (:mod:`~dmp_cpg_ros.core.gait.speed_limit`). The speed u is that of the reference, or of the
+    body along it, which stays behind in a stop. Feet that come down faster than hips can bring
+    them to the speed of the ground throw the body up.
+
+    Parameters
+    ----------
+    network : GaitNetwork
+        That acts, with a factor on its cadence already.
+    quickness : float
+        That factor.
+    r : ndarray (3,)
+        Reference v_x, v_y [m/s], γ [rad/s].
+    body : pair of float
+        Velocity of the body [m/s].
+
+    Returns
+    -------
+    float
+        Positive; infinite without a speed, or where it is not known what hips can.
+    """
+    (v_x, v_y, _), omega, _, duty = network.gait.pace(r, network.scale)
+    speed = hypot(v_x, v_y)
+    if speed == 0.0:
+        return inf
+    along = max(speed, (v_x * body[0] + v_y * body[1]) / speed)
+    return network.scale.swing / swing_acceleration(along, omega / (2.0 * pi * quickness), duty)
 
 
 def time_to_slow(quickness: float) -> float:

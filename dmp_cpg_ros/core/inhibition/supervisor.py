@@ -44,7 +44,7 @@ from dmp_cpg_ros.core.inhibition.caution import (
 )
 from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, push_step
-from dmp_cpg_ros.core.inhibition.step_timing import quickened
+from dmp_cpg_ros.core.inhibition.step_timing import quickened, quickest
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
@@ -188,18 +188,17 @@ class GaitSupervisor:
         state = self._pushed(state, network, x, margins, body_mode)
         most = 1.0 if wanted is None else changing_share(network, wanted, command)
         quick = state.quickness > 1.0
-        state = self._balancing(state, margins, network, progress or Progress(), most, dt)
+        state = self._balancing(state, margins, network, progress or Progress(), r, most, dt)
         if state.requested:  # until it acts the reference may speed up
             return (replace_unchecked(state, armed=False, state='waiting') if quick or not acts
                     else self._stopping(state, network, x, rates, speed))
         return self._running(state, network.phase_errors(x), speed)
 
     def _balancing(self, state: SupervisorState, margins: Sequence[float] | None,
-                   network: GaitNetwork, progress: Progress, most: float, dt: float
+                   network: GaitNetwork, progress: Progress, r: Array, most: float, dt: float
                    ) -> SupervisorState:
-        """Follow less of the command, and step faster, while the body is disturbed; follow at most
-        a share of it while the gait changes. On rough ground feet need their time to be lifted
-        over it; over gaps the body does not slow down.
+        """Follow less of the command, and step faster, while the body is disturbed; less, too, while
+        the gait changes. Over rough ground feet need their time; over gaps no body slows down.
         """
         least = CLIMBING if progress.rough else STRIDING if progress.gaps else LEAST
         p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.wide)
@@ -208,7 +207,8 @@ class GaitSupervisor:
         if not (predicted or state.push.acts):
             share = followed_share(state.share, left if p.caution else None, dt, most, least)
         free = p.step_timing and (state.push.acts or not predicted) and not progress.rough
-        quickness = quickened(state.quickness, left if free else None, dt)
+        quickness = quickened(state.quickness, left if free else None, dt, quickest(
+            network, state.quickness, r, progress.velocity))
         same = (share, quickness) == (state.share, state.quickness)
         return state if same else replace_unchecked(state, share=share, quickness=quickness)
 

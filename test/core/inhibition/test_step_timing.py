@@ -4,15 +4,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import inf, pi
+
 import numpy as np
 import pytest
+from core_examples import network
 from standing_run import TICK, Run, walking
 from test_push_recovery import TO_THE_LEFT, resting, told
 
 from dmp_cpg_ros.core.balance.capture_point import WIDE
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.gait.speed_limit import swing_acceleration
 from dmp_cpg_ros.core.inhibition.caution import DISTURBED, room
-from dmp_cpg_ros.core.inhibition.step_timing import QUICKEST, RISING, SLOWING, quickened
+from dmp_cpg_ros.core.inhibition.step_timing import (
+    QUICKEST,
+    RISING,
+    SLOWING,
+    quickened,
+    quickest,
+)
+from dmp_cpg_ros.studies.walking_trials import Walk, is_there
 
 FALLING = (1.0, 1.0, -1.0, 1.0)
 
@@ -39,6 +51,45 @@ def test_it_rises_and_falls_at_its_rates() -> None:
     for left in (None, room(WIDE, 0.3, 1.0)):
         assert quickened(QUICKEST, left, 0.1) == pytest.approx(QUICKEST - 0.1 * SLOWING)
         assert quickened(QUICKEST, left, 10.0) == 1.0
+
+
+@pytest.mark.parametrize('gait', ['amble', 'trot', 'pronk'])
+@pytest.mark.parametrize('quickness', [1.0, 2.0])
+@pytest.mark.parametrize(('v_x', 'body'), [
+    (0.5, 0.2), (-0.5, -0.5), (1.0, 2.5), (-0.4, -3.0), (0.02, 3.0)])
+def test_legs_go_no_faster_than_hips_can_swing_them_at_the_speed_of_the_body(
+        gait: str, quickness: float, v_x: float, body: float) -> None:
+    slow = network(gait)
+    slow.scale = scale = replace(slow.scale, swing=200.0)
+    acts = slow.of(slow.gait.scaled(quickness))
+    most = quickest(acts, quickness, np.array([v_x, 0.0, 0.3]), (body, 1.5))
+    pace = slow.gait.pace(np.array([v_x, 0.0, 0.3]), scale)
+    needed = swing_acceleration(
+        max(abs(v_x), abs(body)), most * pace.omega / (2.0 * pi), pace.duty)
+    assert needed == pytest.approx(200.0)
+    fallen = quickened(1.0, room(FALLING, 0.3, 1.0), 1.0, most)
+    assert fallen == pytest.approx(max(1.0, min(QUICKEST, most)))
+
+
+def test_a_push_at_rest_or_sideways_is_answered_as_fast_as_ever() -> None:
+    of = network('trot')
+    of.scale = replace(of.scale, swing=200.0)
+    for v_x in (0.0, 0.3):
+        assert quickest(of, 1.0, np.array([v_x, 0.0, 0.0]), (v_x, 3.0)) > QUICKEST
+    of.scale = replace(of.scale, swing=inf)
+    assert quickest(of, 1.0, np.array([3.0, 0.0, 0.0]), (3.0, 0.0)) == inf
+
+
+@pytest.mark.skipif(not is_there('robots/go1'), reason='the model of Go1 is not installed')
+def test_a_robot_that_is_stopped_at_its_highest_speed_is_not_thrown_up_by_its_own_steps() -> None:
+    """It took the way that a body has behind its reference for a push, stepped 2.5 times as fast,
+    hit the ground with five times its weight, and fell.
+    """
+    run = Walk('trot', 'robots/go1', seed=3)
+    run.loop.command(3.5)
+    assert run.walk(4.0)
+    run.stop()
+    assert run.walk(2.0)
 
 
 def test_who_is_not_pushed_does_not_notice() -> None:
