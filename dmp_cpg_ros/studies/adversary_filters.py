@@ -25,8 +25,8 @@ _RATE = 1.1
 
 def draw_reference(rng: np.random.Generator, _: bool) -> Case:
     """Two references and a tick, with a speed to slow down to."""
-    return {'alpha_r': log_uniform(rng, 0.5, 40.0), 'tick_s': log_uniform(rng, 0.001, 0.01),
-            'braking': log_uniform(rng, 0.2, 20.0) if rng.random() < 0.5 else 0.0,
+    return {'alpha_r': log_uniform(rng, 0.5, 6.0), 'tick_s': log_uniform(rng, 0.001, 0.01),
+            'braking': log_uniform(rng, 0.2, 6.0) if rng.random() < 0.5 else 0.0,
             'reference': rng.uniform(-1.0, 1.0, 3).tolist(), 'foot_distance': 0.3,
             'other': rng.uniform(-1.0, 1.0, 3).tolist(), 'wanted': log_uniform(rng, 0.01, 1.0)}
 
@@ -97,7 +97,7 @@ def _spring(k: float, b: float, theta: Array, rate: float, dt: float, apart: Arr
 
 def draw_hierarchy(rng: np.random.Generator, _: bool) -> Case:
     """Rates of all filters, and a spring-damper."""
-    rates = {name: log_uniform(rng, 0.5, 40.0) for name in (
+    rates = {name: log_uniform(rng, 0.5, 6.0) for name in (
         'alpha_r', 'activity_rate', 'placement_rate')}
     return {'gait': 'amble', 'tick_s': 0.004, 'parameters': {
         **rates, 'stiffness': log_uniform(rng, 10.0, 1e4),

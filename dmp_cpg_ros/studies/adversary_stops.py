@@ -20,7 +20,7 @@ from dmp_cpg_ros.core.transformation.foot_path import FootPath
 from dmp_cpg_ros.studies.draws import Case, Judged, log_uniform
 from dmp_cpg_ros.studies.oscillator_loop import GAITS, Oscillators
 
-_FAST = {'alpha_r': 10.0, 'activity_rate': 50.0, 'auto_inhibit': False, 'push_recovery': False}
+_FAST = {'alpha_r': 6.0, 'activity_rate': 50.0, 'auto_inhibit': False, 'push_recovery': False}
 """Parameters with which a run is short."""
 
 _SPEED = 0.5  # of the reference while the gait runs [m/s]
@@ -114,7 +114,7 @@ def judge_posture(description: RobotDescription, case: Case, weaken: bool) -> Ju
 
 def draw_slow_stop(rng: np.random.Generator, weaken: bool) -> Case:
     """A suite whose reference slows down slowly."""
-    slow = rng.uniform(0.05, 0.4) if weaken else log_uniform(rng, 0.5, 10.0)
+    slow = rng.uniform(0.05, 0.4) if weaken else log_uniform(rng, 0.5, 6.0)
     return suite_case(rng, {'alpha_r': float(slow),
                             'capture_speed': log_uniform(rng, 0.02, 0.1 if weaken else 0.5),
                             'max_speed': log_uniform(rng, 0.3, 2.0), 'max_lateral_speed': 0.0,

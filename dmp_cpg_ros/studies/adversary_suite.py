@@ -184,8 +184,8 @@ def _promised(loop: Oscillators, predict: Callable[[], float] | None = None) -> 
 
 
 _NUMBERS = {'coupling_gain': (8.0, 400.0), 'rho': (0.5, 20.0), 'inhibition_gain': (60.0, 4000.0),
-            'region_radius': (0.03, 1.2), 'cadence_scale': (0.7, 4.0), 'alpha_r': (0.7, 20.0),
-            'capture_speed': (0.02, 2.0), 'max_speed': (0.05, 4.0), 'braking': (0.2, 20.0),
+            'region_radius': (0.03, 1.2), 'cadence_scale': (0.7, 4.0), 'alpha_r': (0.7, 6.0),
+            'capture_speed': (0.02, 2.0), 'max_speed': (0.05, 4.0), 'braking': (0.2, 6.0),
             'radius': (0.3, 3.0), 'gait_change_rate': (0.05, 0.5)}
 _DEFAULTS = {'max_lateral_speed': 0.3, 'max_turn_rate': 1.0, 'auto_inhibit': False,
              'push_recovery': False}  # a stop that a push releases has no bound
@@ -208,10 +208,10 @@ _LIMITS = {'max_lateral_speed': 0.0, 'max_turn_rate': 0.0}
 _TELLING = {'places': 0, 'acting': 1, 'holding': 2, 'arming': 4, 'leads': 5, 'way': 5}
 """Which of the sequences that once told something is about a condition."""
 _GUIDED = {'arming': {'alpha_r': (0.7, 4.0), 'max_speed': (1.0, 4.0)},
-           'acting': {'alpha_r': (3.0, 20.0), 'max_speed': (0.3, 2.0),
+           'acting': {'alpha_r': (3.0, 6.0), 'max_speed': (0.3, 2.0),
                       'cadence_scale': (0.7, 0.8), 'gait_change_rate': (0.05, 0.25),
                       'inhibition_gain': (900.0, 2500.0)},
-           'leads': {'alpha_r': (3.0, 20.0), 'cadence_scale': (1.0, 3.0)},
+           'leads': {'alpha_r': (3.0, 6.0), 'cadence_scale': (1.0, 3.0)},
            'way': {'max_speed': (0.3, 2.0)}}
 """Parameters with which a condition that is left out shows."""
 

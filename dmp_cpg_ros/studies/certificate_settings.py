@@ -114,7 +114,7 @@ def random_setting(rng: np.random.Generator) -> Setting:
                         graph) or topology(graph, len(LEGS))
     weights = gain * np.exp(rng.uniform(-0.7, 0.7, len(edges)) * rng.integers(2))
     _couple(network, graph_from_edges(len(LEGS), edges, weights, network.gait.phases))
-    reference = ReferenceParameters(max_speed=some(0.1, 2.0), alpha_r=some(1.0, 30.0))
+    reference = ReferenceParameters(max_speed=some(0.1, 2.0), alpha_r=some(1.0, 6.0))
     legs = tuple(LEGS[leg] for leg in rng.permutation(len(LEGS))[:rng.integers(1, 5)])
     region = radius * some(0.05, 1.0)
     plain = InhibitionParameters(inhibited_legs=legs, region_radius=region)

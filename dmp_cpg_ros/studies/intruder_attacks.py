@@ -186,7 +186,7 @@ def _events(node: Intruder) -> None:
     lies = [('gait', ParameterValue(type=4, string_value='nope')),
             ('gait', ParameterValue(type=4, string_value='trot')),
             ('gait', ParameterValue(type=77)),
-            ('alpha_r', ParameterValue(type=3, double_value=9.0)),
+            ('alpha_r', ParameterValue(type=3, double_value=5.0)),
             ('rho', ParameterValue(type=3, double_value=1e300)),
             ('region_radius', ParameterValue(type=3, double_value=1.9))]
     for owner in (core.CANONICAL, core.REFERENCE, core.INHIBITION):

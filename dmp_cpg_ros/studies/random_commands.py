@@ -45,13 +45,11 @@ GAITS = ('amble', 'walk', 'trot', 'pace', 'bound', 'pronk')
 
 NUMBERS = {
     'rho': (2.0, 50.0), 'coupling_gain': (5.0, 400.0), 'cadence_scale': (0.7, 4.0),
-    'gait_change_rate': (0.01, 0.6), 'alpha_r': (0.3, 10.0), 'max_speed': (0.02, 10.0),
+    'gait_change_rate': (0.01, 0.6), 'alpha_r': (0.3, 6.0), 'max_speed': (0.02, 10.0),
     'max_lateral_speed': (0.02, 10.0), 'max_turn_rate': (0.02, 10.0), 'max_curve': (0.01, 10.0),
     'braking': (0.5, 6.0), 'inhibition_gain': (100.0, 4000.0), 'region_radius': (0.05, 0.6),
     'capture_speed': (0.01, 10.0), 'auto_delay': (0.05, 5.0)}
-"""Numbers that change, and between what they are drawn, evenly over their logarithms; alpha_r and
-braking up to where bodies still follow a stop.
-"""
+"""Numbers that change, and between what they are drawn, evenly over their logarithms."""
 
 NEAR_THE_GROUND = ('lowering', 'lying', 'rising')
 """Modes of a body that has not fallen and may touch the ground."""

@@ -123,8 +123,8 @@ class Relay(SuiteNode):
         self.out.publish(self.writer.fill(stamp_ns, np.array(self.command)))
 
     def check_parameters(self, sets: Any) -> None:
-        if sets[ReferenceParameters].alpha_r == 7.0:
-            raise ParameterError('alpha_r = 7.0 would lose the certificate')
+        if sets[ReferenceParameters].alpha_r == 5.5:
+            raise ParameterError('alpha_r = 5.5 would lose the certificate')
 
     def diagnostic_values(self) -> dict[str, Any]:
         return {'v_x': self.command[0]}
@@ -231,8 +231,8 @@ def test_every_node_has_its_place_in_the_table() -> None:
 
 @pytest.mark.parametrize(('values', 'problem'), [
     ({'alpha_r': 'fast'}, "alpha_r.*must be a number, not 'fast'"),
-    ({'alpha_r': math.nan}, 'alpha_r.*nan.*0.05, 50'),
-    ({'alpha_r': 50.1}, 'alpha_r.*50.1.*0.05, 50'),
+    ({'alpha_r': math.nan}, 'alpha_r.*nan.*0.05, 6'),
+    ({'alpha_r': 6.1}, 'alpha_r.*6.1.*0.05, 6'),
     ({'alpha_R': 3.0}, "no parameter 'alpha_R'.*alpha_r"),
     ({'count': 1.5}, 'count.*whole number'),
     ({'count': True}, 'count.*whole number'),
@@ -314,19 +314,19 @@ def change(ros: Ros, **values: Any) -> tuple[bool, str]:
 def test_changes_act_together_at_the_next_tick(ros: Ros, started: Relay) -> None:
     robot = Robot(ros)
     robot.tick()
-    assert change(ros, alpha_r=9.0, count=4) == (True, '')
+    assert change(ros, alpha_r=6.0, count=4) == (True, '')
     assert started.parameters_of(ReferenceParameters).alpha_r == 3.0
     assert change(ros, count=5)[0]
     robot.tick()
     robot.tick()
-    assert started.changes == [(2, 9.0, 5)]
+    assert started.changes == [(2, 6.0, 5)]
 
 
 def test_a_change_that_cannot_be_is_refused_with_the_reason(ros: Ros, started: Relay) -> None:
     robot = Robot(ros)
     for values, reason in (({'alpha_r': 'x'}, 'type'), ({'alpha_r': 1e9}, 'alpha_r'),
                            ({'alpha_r': math.nan}, 'alpha_r'), ({'count': 6}, 'upper = 5.0'),
-                           ({'alpha_r': 7.0}, 'certificate'), ({'gains': [math.nan]}, 'gains'),
+                           ({'alpha_r': 5.5}, 'certificate'), ({'gains': [math.nan]}, 'gains'),
                            ({'max_speed': 0.5}, 'what may change is alpha_r, count')):
         accepted, said = change(ros, **values)
         assert not accepted and reason in said, (values, said)
@@ -344,7 +344,7 @@ def test_what_is_no_parameter_or_no_value_is_refused_with_what_is_valid(
             ('alpha_q', Parameter('', value=1.0).to_parameter_msg().value),
             ('', Parameter('', value=1.0).to_parameter_msg().value),
             ('alpha_r', ParameterValue(type=77)),
-            ('alpha_r', Parameter('', value=9.0).to_parameter_msg().value)))
+            ('alpha_r', Parameter('', value=6.0).to_parameter_msg().value)))
     name = 'relay/set_parameters' + '_atomically' * (service is SetParametersAtomically)
     for wrong, reason in ((unknown, "no parameter 'alpha_q'; did you mean alpha_r"),
                           (nameless, "no parameter ''; valid are"),
@@ -774,7 +774,7 @@ def test_bad_arguments_end_a_process_with_status_two(processes: Processes, tmp_p
     file.write_text('model: [', encoding='utf-8')
     started = [
         (processes.node('reference_filter', robot=file), 2, (str(file), 'line 1')),
-        (processes.node('reference_filter', alpha_r='.nan'), 2, ('alpha_r', 'nan', '[0.05, 50]')),
+        (processes.node('reference_filter', alpha_r='.nan'), 2, ('alpha_r', 'nan', '[0.05, 6]')),
         (processes.node('reference_filter', alpha_r='fast'), 2, ('alpha_r', 'fast', 'number')),
         (processes.node('reference_filter', alpha='3.0'), 2, ("'alpha'", 'alpha_r')),
         (processes.node('reference_filter', '-p'), 2, ('-p',)),

@@ -32,12 +32,12 @@ LOWERED_LIMIT = case({}, (0.1, 'start', None), (0.0, 'command', [3.0, 0.0, 0.0])
                      (4.0, 'set', {'max_speed': 0.05, 'max_lateral_speed': 0.0,
                                    'max_turn_rate': 0.0}), (0.004, 'stop', None))
 CADENCE = case(
-    {'cadence_scale': 0.7, 'alpha_r': 20.0, 'max_speed': 1.0, 'inhibition_gain': 1200.0},
+    {'cadence_scale': 0.7, 'alpha_r': 6.0, 'max_speed': 1.0, 'inhibition_gain': 1200.0},
     (0.1, 'start', None), (3.0, 'set', {'cadence_scale': 4.0}), (0.1, 'stop', None))
 AT_REST = case({'coupling_gain': 25.0}, (1.0, 'set', {'inhibited_legs': ('rr',)}),
                (3.0, 'start', None))
-AHEAD = case({'alpha_r': 20.0}, (0.0, 'command', [1.5, 0.0, 0.0]), (3.0, 'start', None),
-             (2.208, 'stop', None)) | {'gait': 'pace', 'lead_s': 0.2}
+AHEAD = case({'alpha_r': 6.0}, (0.0, 'command', [1.5, 0.0, 0.0]), (3.0, 'start', None),
+             (2.108, 'stop', None)) | {'lead_s': 0.2}
 BROKEN = {'places': WITHIN_A_START, 'arming': LOWERED_LIMIT, 'acting': CADENCE, 'holding': AT_REST,
           'leads': AHEAD, 'way': AHEAD}
 

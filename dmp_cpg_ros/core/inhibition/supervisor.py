@@ -197,8 +197,8 @@ class GaitSupervisor:
     def _balancing(self, state: SupervisorState, margins: Sequence[float] | None,
                    network: GaitNetwork, progress: Progress, r: Array, most: float, dt: float
                    ) -> SupervisorState:
-        """Follow less of the command, and step faster, while the body is disturbed; less, too, while
-        the gait changes. Over rough ground feet need their time; over gaps no body slows down.
+        """Follow less of the command, and step faster, while the body is disturbed; less also
+        while the gait changes. Over rough ground feet need time; over gaps no body slows down.
         """
         least = CLIMBING if progress.rough else STRIDING if progress.gaps else LEAST
         p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.wide)

@@ -37,7 +37,9 @@ from dmp_cpg_ros.core.reference.governor import Governor
 class ReferenceParameters(Parameters):
     """Parameters of the reference system."""
 
-    alpha_r: float = parameter(3.0, 'rate of the reference filters', 0.05, 50.0, unit='1/s')
+    alpha_r: float = parameter(
+        3.0, 'rate of the reference filters; bodies do not follow faster stops', 0.05, 6.0,
+        unit='1/s')
     max_speed: float = parameter(
         3.5, 'largest forward speed that is accepted', 0.0, 10.0, unit='m/s')
     max_lateral_speed: float = parameter(
@@ -52,7 +54,7 @@ class ReferenceParameters(Parameters):
         unit='m/s^2')
     braking: float = parameter(
         0.0, 'least deceleration of the reference while a stop is requested; 0: as alpha_r has it',
-        0.0, 20.0, unit='m/s^2')
+        0.0, 6.0, unit='m/s^2')
     cmd_vel_timeout: float = parameter(
         0.5, 'time without cmd_vel after which the command is zero; 0: never', 0.0, 3600.0,
         unit='s')

@@ -101,7 +101,7 @@ def test_what_is_known_early_not_to_hold_is_what_does_not_hold() -> None:
             'coupling_graph': str(rng.choice(['all_to_all', 'ring', 'path', 'directed_ring'])),
             'inhibition_gain': 10.0 ** rng.uniform(2.0, 3.3), 'voting': number % 5 == 0,
             'inhibited_legs': ('auto',) if number % 3 == 0 else ('rr',),
-            'alpha_r': 10.0 ** rng.uniform(-0.7, 1.0)})
+            'alpha_r': 6.0 * 10.0 ** rng.uniform(-1.5, 0.0)})
         seen.add(running.holds())
         assert running.holds() == running.certificate().holds
     assert seen == {True, False}
@@ -266,8 +266,8 @@ def test_what_one_inequality_needs_and_then_the_others_is_what_halving_all_of_th
                         'cadence_scale', 'vote_limit'], 1 + seed % 3, replace=False)
     wanted = {str(name): float(running.values[name]) * rng.choice([0.02, 0.1, 2.0, 50.0])
               for name in names}
-    for name, (least, most) in {'cadence_scale': (0.7, 4.0), 'region_radius': (0.05, 0.9),
-                                'vote_limit': (0.05, 10.0)}.items():
+    for name, (least, most) in {'cadence_scale': (0.7, 4.0), 'alpha_r': (0.05, 6.0),
+                                'region_radius': (0.05, 0.9), 'vote_limit': (0.05, 10.0)}.items():
         if name in wanted:
             wanted[name] = min(max(wanted[name], least), most)
     verdict = judge(wanted, running)

@@ -156,7 +156,7 @@ def test_the_bound_grows_with_the_distance_to_the_speed_of_capture() -> None:
 
 
 @pytest.mark.parametrize('name', ['amble', 'walk', 'trot', 'bound'])
-@pytest.mark.parametrize(('speed', 'alpha_r'), [(0.2, 3.0), (1.0, 3.0), (3.0, 3.0), (1.0, 8.0)])
+@pytest.mark.parametrize(('speed', 'alpha_r'), [(0.2, 3.0), (1.0, 3.0), (3.0, 3.0), (1.0, 6.0)])
 def test_the_reference_does_not_go_farther_than_its_bound_and_nearly_as_far(
         name: str, speed: float, alpha_r: float) -> None:
     gait, inhibition = network(name), InhibitionParameters(auto_inhibit=False)

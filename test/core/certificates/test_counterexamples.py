@@ -107,7 +107,7 @@ def test_a_stop_while_the_cadence_moves_is_predicted_to_the_tick(first: float, t
 @pytest.mark.parametrize('asked_first', [True, False])
 def test_a_stop_in_whose_tick_a_change_of_gait_begins_is_bounded_with_its_pause(
         asked_first: bool) -> None:
-    walk = Walk(alpha_r=12.0)
+    walk = Walk(alpha_r=6.0)
     walk.walk(0.3, 2.0)
     plain = walk.loop.time_to_rest()
     if asked_first:
@@ -202,7 +202,7 @@ def test_stops_within_starts_keep_the_bound_that_is_stated(seed: int) -> None:
 @pytest.mark.parametrize(('graph', 'gain'), [('path', 60.0), ('all_to_all', 30.0)])
 def test_legs_that_are_held_are_not_let_go_by_who_takes_the_stop_over(
         graph: str, gain: float, wait: float) -> None:
-    walk = Walk(coupling_graph=graph, coupling_gain=gain, capture_speed=1.0, alpha_r=10.0)
+    walk = Walk(coupling_graph=graph, coupling_gain=gain, capture_speed=1.0, alpha_r=6.0)
     walk.walk(0.5, 2.0)
     walk.loop.request(True)
     while walk.loop.stop.state != 'captured':

@@ -75,7 +75,7 @@ def test_two_states_under_the_same_goals_converge_to_one_another() -> None:
     assert np.abs(a.position - b.position).max() < 1e-9
 
 
-@given(alpha=st.floats(0.1, 50.0), r=vectors, r_ext=vectors, a=durations, b=durations)
+@given(alpha=st.floats(0.1, 6.0), r=vectors, r_ext=vectors, a=durations, b=durations)
 def test_reference_steps_add_up_exactly(
         alpha: float, r: np.ndarray, r_ext: np.ndarray, a: float, b: float) -> None:
     of = ReferenceSystem(ReferenceParameters(alpha_r=alpha, max_acceleration=1e3))
