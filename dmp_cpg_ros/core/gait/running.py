@@ -108,22 +108,11 @@ def limiting_gaits(parameters: GaitChoiceParameters, name: str, named: Callable[
 def limits_on_the_way(parameters: GaitChoiceParameters, name: str, named: Callable[[str], Gait],
                       wanted: float, acting: float | None = None
                       ) -> tuple[tuple[Gait, ...], tuple[Gait, ...], float]:
-    """Gaits whose limits commands are to keep while the cadence moves, which hips and legs have to
-    follow all the way: the limits between two cadences are not below those of both.
+    """Gaits whose limits commands are to keep while the cadence moves; between two cadences none
+    is lower than at both.
 
-    Parameters
-    ----------
-    parameters, name, named
-        As for :func:`limiting_gaits`.
-    wanted, acting : float
-        Factors on the cadence; the one that acts is the wanted one where it is not given.
-
-    Returns
-    -------
-    wanted, acting : tuple of Gait
-        At both cadences; none for the latter where it has arrived.
-    float
-        Time until it arrives [s].
+    Returns :func:`limiting_gaits` at the factor on the cadence that is wanted, and at the one that
+    acts, none where it is not given or has arrived; and the time until it arrives [s].
     """
     gaits = limiting_gaits(parameters, name, named, wanted)
     if acting is None or acting == wanted:
