@@ -297,7 +297,7 @@ def test_descriptors_tell_unit_range_and_what_may_change(ros: Ros, started: Rela
     alpha_r, count, executor, words, max_speed = answer.descriptors
     assert '[1/s]' in alpha_r.description and not alpha_r.read_only
     limits = alpha_r.floating_point_range[0]
-    assert (limits.from_value, limits.to_value) == (0.05, 50.0)
+    assert (limits.from_value, limits.to_value) == (0.05, 6.0)
     assert (count.integer_range[0].from_value, count.integer_range[0].to_value) == (1, 9)
     assert executor.read_only and 'events, single' in executor.additional_constraints
     assert 'a, b, c' in words.additional_constraints
@@ -369,7 +369,7 @@ def test_help_tells_everything_without_starting_ros() -> None:
     table = Relay.parameter_table()
     for name, field in table.fields.items():
         assert f'{name}: {field.metadata["description"]}' in text
-    for part in ('[1/s]', 'default 3.0, from 0.05 to 50, changeable', 'default [a, b]',
+    for part in ('[1/s]', 'default 3.0, from 0.05 to 6, changeable', 'default [a, b]',
                  'from 0 to inf'):
         assert part in text, part
 

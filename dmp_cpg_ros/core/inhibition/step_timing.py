@@ -16,8 +16,8 @@ legs go through their cycles κ times as fast while the room of the capture poin
     κ = 1 + (QUICKEST − 1) (1 − sat(room / DISTURBED)) :
 
 from what standing legs can just bear to a capture point on the edge of the support, but no farther
-than hips can swing the legs at the speed of the body (:func:`quickest`). κ rises within
-``RISING`` and falls at ``SLOWING``: later steps are early too.
+than hips can swing the legs at the speed that the body has from walking (:func:`quickest`). κ
+rises within ``RISING`` and falls at ``SLOWING``: later steps are early too.
 
 ω is common to all oscillators. In the frame that turns with it nothing changes, so that phase
 relations stay, and what is certified of free legs holds for any ω(t). In a stop, and in a start
@@ -28,7 +28,7 @@ it was computed for.
 
 from __future__ import annotations
 
-from math import hypot, inf, pi
+from math import exp, hypot, inf, pi
 
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.speed_limit import swing_acceleration
@@ -47,6 +47,9 @@ and the cadence put them: a jump of the cadence would be a jump of the feet.
 SLOWING = 2.0
 """Rate at which the factor falls again [1/s]: a step or two."""
 
+FORGETTING = 0.3
+"""Rate at which a speed of the reference is forgotten [1/s]: far slower than a body loses it."""
+
 
 def quickened(quickness: float, left: float | None, dt: float, most: float = QUICKEST) -> float:
     """Factor κ on the cadence after a tick of dt [s], in [1, ``QUICKEST``], from the one before
@@ -60,11 +63,16 @@ def quickened(quickness: float, left: float | None, dt: float, most: float = QUI
     return max(slower, min(wanted, quickness + (QUICKEST - 1.0) * dt / RISING))
 
 
-def quickest(network: GaitNetwork, quickness: float, r: Array, body: Pair) -> float:
+def fastest_lately(before: float, r: Array, dt: float) -> float:
+    """Fastest that a reference (3,) has been, slowly forgotten, a tick of dt [s] later [m/s]."""
+    return max(hypot(*r.tolist()[:2]), before * exp(-FORGETTING * dt))
+
+
+def quickest(network: GaitNetwork, quickness: float, r: Array, body: Pair, lately: float) -> float:
     """Factor κ up to which hips can swing the legs, 6 u κ f/(1 − β)² ≤ τ l/I, as commands keep to
     (:mod:`~dmp_cpg_ros.core.gait.speed_limit`). The speed u is that of the reference, or of the
-    body along it, which stays behind in a stop. Feet that come down faster than hips can bring
-    them to the speed of the ground throw the body up.
+    body along it, which stays behind in a stop; what a push has added does not count. Feet that
+    come down faster than hips can bring them to the speed of the ground throw the body up.
 
     Parameters
     ----------
@@ -76,6 +84,8 @@ def quickest(network: GaitNetwork, quickness: float, r: Array, body: Pair) -> fl
         Reference v_x, v_y [m/s], γ [rad/s].
     body : pair of float
         Velocity of the body [m/s].
+    lately : float
+        From :func:`fastest_lately` [m/s].
 
     Returns
     -------
@@ -86,7 +96,7 @@ def quickest(network: GaitNetwork, quickness: float, r: Array, body: Pair) -> fl
     speed = hypot(v_x, v_y)
     if speed == 0.0:
         return inf
-    along = max(speed, (v_x * body[0] + v_y * body[1]) / speed)
+    along = max(speed, min(lately, (v_x * body[0] + v_y * body[1]) / speed))
     return network.scale.swing / swing_acceleration(along, omega / (2.0 * pi * quickness), duty)
 
 

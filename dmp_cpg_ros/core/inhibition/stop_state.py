@@ -58,6 +58,8 @@ class SupervisorState:
         Phase of fl at rest [rad].
     share, quickness : float
         Share of the command that the reference follows, and factor on the cadence.
+    fastest : float
+        That the reference has been lately [m/s].
     block : BlockState
         Whether the robot makes way, and whether it has stopped because it does not.
     """
@@ -80,6 +82,7 @@ class SupervisorState:
     rest_phase: float = 0.0
     share: float = 1.0
     quickness: float = 1.0
+    fastest: float = 0.0
     block: BlockState = NO_BLOCK
 
     @property

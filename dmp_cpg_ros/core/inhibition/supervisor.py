@@ -44,7 +44,7 @@ from dmp_cpg_ros.core.inhibition.caution import (
 )
 from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, push_step
-from dmp_cpg_ros.core.inhibition.step_timing import quickened, quickest
+from dmp_cpg_ros.core.inhibition.step_timing import fastest_lately, quickened, quickest
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
@@ -207,10 +207,10 @@ class GaitSupervisor:
         if not (predicted or state.push.acts):
             share = followed_share(state.share, left if p.caution else None, dt, most, least)
         free = p.step_timing and (state.push.acts or not predicted) and not progress.rough
+        fastest = fastest_lately(state.fastest, r, dt)
         quickness = quickened(state.quickness, left if free else None, dt, quickest(
-            network, state.quickness, r, progress.velocity))
-        same = (share, quickness) == (state.share, state.quickness)
-        return state if same else replace_unchecked(state, share=share, quickness=quickness)
+            network, state.quickness, r, progress.velocity, fastest))
+        return replace_unchecked(state, share=share, quickness=quickness, fastest=fastest)
 
     def _automatic(self, state: SupervisorState, commanded: bool) -> SupervisorState:
         """Stop after a time of zero command, and start at a command."""

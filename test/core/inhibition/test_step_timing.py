@@ -57,15 +57,16 @@ def test_it_rises_and_falls_at_its_rates() -> None:
 @pytest.mark.parametrize('quickness', [1.0, 2.0])
 @pytest.mark.parametrize(('v_x', 'body'), [
     (0.5, 0.2), (-0.5, -0.5), (1.0, 2.5), (-0.4, -3.0), (0.02, 3.0)])
-def test_legs_go_no_faster_than_hips_can_swing_them_at_the_speed_of_the_body(
-        gait: str, quickness: float, v_x: float, body: float) -> None:
+@pytest.mark.parametrize('lately', [0.3, 2.8])
+def test_legs_go_no_faster_than_hips_can_swing_them_at_the_speed_that_the_body_has_from_walking(
+        gait: str, quickness: float, v_x: float, body: float, lately: float) -> None:
     slow = network(gait)
     slow.scale = scale = replace(slow.scale, swing=200.0)
     acts = slow.of(slow.gait.scaled(quickness))
-    most = quickest(acts, quickness, np.array([v_x, 0.0, 0.3]), (body, 1.5))
+    most = quickest(acts, quickness, np.array([v_x, 0.0, 0.3]), (body, 1.5), lately)
     pace = slow.gait.pace(np.array([v_x, 0.0, 0.3]), scale)
     needed = swing_acceleration(
-        max(abs(v_x), abs(body)), most * pace.omega / (2.0 * pi), pace.duty)
+        max(abs(v_x), min(lately, abs(body))), most * pace.omega / (2.0 * pi), pace.duty)
     assert needed == pytest.approx(200.0)
     fallen = quickened(1.0, room(FALLING, 0.3, 1.0), 1.0, most)
     assert fallen == pytest.approx(max(1.0, min(QUICKEST, most)))
@@ -75,20 +76,25 @@ def test_a_push_at_rest_or_sideways_is_answered_as_fast_as_ever() -> None:
     of = network('trot')
     of.scale = replace(of.scale, swing=200.0)
     for v_x in (0.0, 0.3):
-        assert quickest(of, 1.0, np.array([v_x, 0.0, 0.0]), (v_x, 3.0)) > QUICKEST
+        assert quickest(of, 1.0, np.array([v_x, 0.0, 0.0]), (v_x, 3.0), v_x) > QUICKEST
     of.scale = replace(of.scale, swing=inf)
-    assert quickest(of, 1.0, np.array([3.0, 0.0, 0.0]), (3.0, 0.0)) == inf
+    assert quickest(of, 1.0, np.array([3.0, 0.0, 0.0]), (3.0, 0.0), 3.0) == inf
 
 
 @pytest.mark.skipif(not is_there('robots/go1'), reason='the model of Go1 is not installed')
-def test_a_robot_that_is_stopped_at_its_highest_speed_is_not_thrown_up_by_its_own_steps() -> None:
+@pytest.mark.parametrize('stop', [True, False])
+def test_a_robot_that_is_stopped_at_its_highest_speed_is_not_thrown_up_by_its_own_steps(
+        stop: bool) -> None:
     """It took the way that a body has behind its reference for a push, stepped 2.5 times as fast,
     hit the ground with five times its weight, and fell.
     """
     run = Walk('trot', 'robots/go1', seed=3)
     run.loop.command(3.5)
     assert run.walk(4.0)
-    run.stop()
+    if stop:
+        run.stop()
+    else:
+        run.loop.command(0.0)
     assert run.walk(2.0)
 
 
