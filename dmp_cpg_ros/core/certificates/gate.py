@@ -96,11 +96,13 @@ class Running:
         of = self._of_certificate
         return votes_among(of.parameters, of.networks, of.tick_s, until_lost=until_lost)
 
-    @property
-    def effort(self) -> int:
-        """How long a certificate takes: number of networks, times that of sets of voters."""
+    def effort(self, among: str = '') -> int:
+        """How long :meth:`first_lost` takes: number of networks, times that of sets of voters
+        where it looks at votes.
+        """
         networks, voting = self.networks, self.parameters.voting
-        return len(networks) * (1 + voting.voting * len(
+        votes = voting.voting and (not among or among in VOTE_ROWS)
+        return len(networks) * (1 + votes * len(
             different_voters(networks[0].system, voting.majority)))
 
     @property

@@ -29,7 +29,7 @@ _ROUNDS, _FEWER_ROUNDS = 5, 3
 """How often the way to what is refused is halved: of one gait without votes, and else."""
 
 MOST_EFFORT = 24
-"""Most :attr:`Running.effort` of a verdict that looks for what would work, for its time to stay
+"""Most :meth:`Running.effort` of a verdict that looks for what would work, for its time to stay
 bounded: about 2 ms each on a slow core."""
 
 
@@ -112,7 +112,7 @@ class Change:
 
     def _nearest(self, held: bool, name: str) -> str:
         """Nearest values that work, as text, where an inequality of a name is lost."""
-        looks = _Looks(MOST_EFFORT - self.proposed.effort)
+        looks = _Looks(MOST_EFFORT - self.proposed.effort())
         differences = self.present.differences(self.proposed)
         numbers = {name: pair for name, pair in differences.items() if isinstance(pair[0], float)}
         words = {name: pair[1] for name, pair in differences.items() if name not in numbers}
@@ -165,7 +165,7 @@ class _Looks:
 
     def first_lost(self, running: Running, among: str = '') -> str:
         """:meth:`Running.first_lost`, or that it is not known."""
-        effort = running.effort if among in ('', *VOTE_ROWS) else 1
+        effort = running.effort(among)
         self.left = self.left - effort if self.left >= effort else 0
         return _first_lost(running, among) if self.left > 0 else 'unknown'
 

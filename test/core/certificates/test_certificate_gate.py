@@ -14,7 +14,6 @@ from core_examples import GAITS, TICK, TICK_NS, network, quadruped, standing_sta
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.verdict import MOST_EFFORT, Change
-from dmp_cpg_ros.core.certificates.votes import VOTE_ROWS
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares, KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, network_system
@@ -311,14 +310,14 @@ def test_what_looking_for_a_value_that_works_takes_is_bounded_and_what_is_told_w
     looked, first_lost = [0], Running.first_lost
 
     def counted(of: Running, among: str = '') -> str:
-        looked.append(of.effort if among in ('', *VOTE_ROWS) else 1)
+        looked.append(of.effort(among))
         return first_lost(of, among)
 
     monkeypatch.setattr(Running, 'first_lost', counted)
     asked = running.changed(values)
     verdict = Change(running, running.certificate(), asked).verdict()
     assert not verdict.accepted
-    assert sum(looked) + asked.effort <= max(MOST_EFFORT, asked.effort)
+    assert sum(looked) + asked.effort() <= max(MOST_EFFORT, asked.effort())
     told = dict(re.findall(r'(\w+) = ([\d.]+)(?:,|$)', verdict.reason.rpartition(': ')[2]))
     if told and 'nearest value' in verdict.reason:
         assert asked.changed({name: float(value) for name, value in told.items()}).holds()
