@@ -196,7 +196,7 @@ def certificates() -> list[Row]:
         ('another coupling gain on a path with votes, three gaits and any leg', change(
             path, coupling_gain=lambda n: 200.0 + 1e-3 * n)),
         ('another cadence there', change(path, cadence_scale=lambda n: 1.0 + 1e-5 * n)),
-        ('a refused region, with one that works', change(
+        ('a refused region there', change(
             path, accepted=False, region_radius=lambda n: 0.1 + 1e-6 * n)),
         ('another coupling gain on a star with votes', change(
             star, coupling_gain=lambda n: 200.0 + 1e-3 * n)),
