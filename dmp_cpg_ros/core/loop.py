@@ -163,8 +163,10 @@ class WalkingLoop:
         self.canon = canon = self.canonical.step(
             self.canon, r, inhibition, dt, state.foot_force, self._contact_limits(dt))
         gait, x, x_dot, network = canon.gait, canon.x, canon.x_dot, self.network
-        self.posture, feedback = self.body.step(
-            self.posture, self._estimated(state), gait, x, x_dot, r, dt)
+        estimated = self._estimated(state)
+        if dt == 0.0 and self.mode.mode == 'standing':  # which it may not be
+            self.posture = self.body.picked_up(self.posture, estimated)
+        self.posture, feedback = self.body.step(self.posture, estimated, gait, x, x_dot, r, dt)
         self._barring = self.mode.mode
         self.votes = self.voting.step(
             self.votes, state.time_ns, network, vote_sensors(state), x, r,

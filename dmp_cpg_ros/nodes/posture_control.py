@@ -254,7 +254,7 @@ class PostureControl(SuiteNode):
         follow_gait(self, gait)
         if not self._joined:
             self._joined = True
-            if stamp_ns > 0:
+            if stamp_ns > 0 or self._state.mode.mode == 'standing':  # which it may not be
                 self._state = self._control.picked_up(self._state, state)
         control, feedback = self._control.step(
             self._state, state, gait, x, x_dot, values['reference'], self.elapsed)

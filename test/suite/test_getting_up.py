@@ -63,6 +63,17 @@ class Life:
                 and last.base_position_in_world[2] > 0.9 * self.robot.description.stance_height)
 
 
+@pytest.mark.parametrize(('pose', 'mode'), [('lying', 'lying'), ('fallen', 'damped')])
+def test_a_robot_that_was_to_stand_and_does_not_is_found_as_it_is(pose: str, mode: str) -> None:
+    """It stood up at once, jumped, and fell over."""
+    life = Life(pose, 'standing', seed=3).go(0.5)
+    assert life.modes[0] == mode
+    assert np.abs(life.column('joint_velocity')).max() < 5.0
+    if mode == 'lying':
+        life.loop.request_mode('stand_up')
+        assert life.go(3.0).stands
+
+
 def test_it_stands_up_from_its_belly_within_its_limits_and_never_sinks() -> None:
     life = Life('lying').go(0.2)
     low = life.robot.description.belly_depth

@@ -124,8 +124,9 @@ class ModeManager:
         return ModeState(0, self.parameters.start_mode, reason='as started')
 
     def picked_up(self, state: ModeState, measured: RobotState) -> ModeState:
-        """Mode of a robot after a restart in the middle of things, unless it was to be damped at
-        the start: what it is found in. One that is neither up nor down is lowered.
+        """Mode of a robot after a restart in the middle of things, or at a start at which it was
+        to stand, unless it was to be damped: what it is found in. One that is neither up nor down
+        is lowered.
         """
         condition = self._sense.condition(measured)
         if state.mode == 'damped':
@@ -135,12 +136,12 @@ class ModeManager:
         elif condition.height >= RISEN_HEIGHT * self._stance_height:
             found = 'standing'
         elif condition.height > self._lain_height:
-            return enter(state, 'lowering', ('fold',), 'found half up after a restart')
+            return enter(state, 'lowering', ('fold',), 'found half up')
         else:
             found = 'lying'
         if found == state.mode:
             return state
-        return replace(state, mode=found, reason='found like that after a restart')
+        return replace(state, mode=found, reason='found like that')
 
     def command(self, state: ModeState) -> BodyCommand:
         """What the legs have to do at the tick of a state."""
