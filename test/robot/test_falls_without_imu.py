@@ -80,6 +80,26 @@ def test_a_fall_is_noticed_without_imu(gait: str) -> None:
     assert run.robot.fallen
 
 
+@pytest.mark.parametrize('gait', ['trot', 'bound', 'pronk'])
+def test_a_body_that_feels_nothing_keeps_its_height(gait: str) -> None:
+    """It went on as it moved up or down when garbage came, for as long as nothing was believed:
+    feet were then to stand on steps that were not there, and threw a robot over.
+    """
+    run = Failing(gait)
+    run.start(0.6)
+    for off in (0.0, 0.06):
+        run.tick(off)
+        begun = run.loop.estimator_state
+        run.injector.add(Fault('bus', 'garbage', 0.025))
+        run.tick(0.5)
+        now = run.loop.estimator_state
+        assert begun is not None and now is not None and now.estimate.problems
+        height = now.estimate.position_in_world[2] - begun.estimate.position_in_world[2]
+        assert abs(height) < 0.01
+        run.tick(1.5)
+        assert not run.robot.fallen
+
+
 @pytest.mark.parametrize('name', WALKS)
 def test_no_walk_is_taken_for_a_fall(name: str) -> None:
     gait, speed, values, faults = WALKS[name]
