@@ -154,9 +154,9 @@ class BodyEstimator:
             memory.filter, 0.5 * (memory.rate + rate), force, dt, noise)
         motion, normal = self._motion(memory.terrain, state, readings)
         if not (seeing or any(readings.usable_legs)):  # a body that feels nothing stays low
-            velocity = vec3.triple(state.velocity_in_base.tolist())
+            kept = vec3.triple(state.velocity_in_base.tolist())
             state = replace_unchecked(state, velocity_in_base=np.array(vec3.moved(
-                velocity, normal, -vec3.dot(velocity, normal))))
+                kept, normal, -vec3.dot(kept, normal))))
         more = dt / self.parameters.contact_settling
         trust = [min(now, before + more)
                  for now, before in zip(self._trust(readings, motion, normal),
