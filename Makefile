@@ -37,7 +37,7 @@ MACHINE := $(word 4,$(FOUND))
 READY := $(VENV)/.dependencies-$(ROS)
 # Exists when .venv has the package as it is now: a copy, so that nothing half-edited runs.
 INSTALLED := $(VENV)/.installed
-SOURCES := $(shell find dmp_cpg_ros config launch resource -not -name '*.pyc' -not -name __pycache__) \
+SOURCES := $(shell find dmp_cpg_ros config launch resource -not -path '*/__pycache__*' -not -name '*.pyc') \
   setup.py setup.cfg package.xml Makefile
 
 ifeq ($(ROS),sourced)
