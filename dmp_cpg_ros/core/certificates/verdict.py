@@ -152,7 +152,7 @@ class Change:
         return f'what works: {"; ".join(found)}' if found else _TOO_LONG
 
 
-_TOO_LONG = 'nothing nearer was looked for: with votes, in these gaits, that takes too long'
+_TOO_LONG = 'nothing nearer was looked for: with these gaits and votes that takes too long'
 
 
 @dataclass

@@ -132,7 +132,9 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
 @lru_cache(maxsize=MOST_KEPT)
 def _box(system: CanonicalSystem, frequencies: bytes, nodes: bytes, region_radius: float
          ) -> tuple[float, Array, float, Array, Array]:
-    """|x_d|, L, the invariant disc, ū and the needed gains, which depend on no gain."""
+    """|x_d|, L (N, N) [1/s], radius of the invariant disc, ū (N,) and the needed gains (N,) [1/s]:
+    what depends on no gain, for frequencies (N,) and inhibited nodes (N,) as bytes.
+    """
     omega, inhibited = np.frombuffer(frequencies), np.frombuffer(nodes, dtype=bool)
     D, L = target_radius(system, inhibited), comparison_laplacian(system.graph)
     largest = invariant_radius(

@@ -109,10 +109,11 @@ def limits_on_the_way(parameters: GaitChoiceParameters, name: str, named: Callab
                       wanted: float, acting: float | None = None
                       ) -> tuple[tuple[Gait, ...], tuple[Gait, ...], float]:
     """Gaits whose limits commands are to keep while the cadence moves; between two cadences none
-    is lower than at both.
+    is lower than at both. Parameters are those of :func:`limiting_gaits`, with the factor on the
+    cadence that is ``wanted`` and the one that is ``acting``.
 
-    Returns :func:`limiting_gaits` at the factor on the cadence that is wanted, and at the one that
-    acts, none where it is not given or has arrived; and the time until it arrives [s].
+    Returns :func:`limiting_gaits` at the first and at the second, none where it is not given or
+    has arrived; and the time until it arrives [s].
     """
     gaits = limiting_gaits(parameters, name, named, wanted)
     if acting is None or acting == wanted:

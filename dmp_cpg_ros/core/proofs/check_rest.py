@@ -85,8 +85,8 @@ def falling(p: Any, s: Any) -> tuple[Any, ...]:
 
 
 def time_to_rest(p: Any, w: Any, s: Any, fallen: Any = ()) -> F:
-    """Bound on the time from a request to rest [s]; w are the witnesses of check_proof.py. What
-    falling(p, s) is may be known.
+    """Bound on the time from a request to rest [s]; w are the witnesses of check_proof.py, fallen
+    is falling(p, s) where that is known.
     """
     Z, P, S, G, Y, near = whole(fallen or falling(p, s))
     h, r, u, R, tick, slow = check_step.step_of(p), p['radius'], s['box'], s['disc'], p['tick'], p[
