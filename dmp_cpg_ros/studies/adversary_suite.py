@@ -191,7 +191,7 @@ _DEFAULTS = {'max_lateral_speed': 0.3, 'max_turn_rate': 1.0, 'auto_inhibit': Fal
              'push_recovery': False}  # a stop that a push releases has no bound
 
 
-def _change(rng: np.random.Generator, names: Sequence[str]) -> Case:
+def random_change(rng: np.random.Generator, names: Sequence[str]) -> Case:
     """A random value of one of some parameters."""
     name = str(rng.choice(names))
     if name == 'inhibited_legs':
@@ -222,7 +222,7 @@ def setting(rng: np.random.Generator, weaken: str = '') -> Case:
     names = rng.permutation(list(_NUMBERS))[:rng.integers(0, 4 if guided else 7)]
     parameters: Case = dict(_DEFAULTS)
     for name in (*names, 'coupling_graph', 'inhibited_legs'):
-        parameters |= _change(rng, [name])
+        parameters |= random_change(rng, [name])
     if guided:
         parameters |= {name: log_uniform(rng, *span) for name, span in guided.items()}
         return {'gait': str(rng.choice(list(GAITS))), 'tick_s': 0.004, 'events': [],
@@ -275,7 +275,7 @@ def _changing(rng: np.random.Generator) -> tuple[str, Any]:
     if rng.random() < 0.3:
         return 'gait', str(rng.choice(list(GAITS)))
     names = OWNER.keys() & {*_NUMBERS, 'inhibited_legs', 'coupling_graph'}
-    return 'set', _change(rng, sorted(names))
+    return 'set', random_change(rng, sorted(names))
 
 
 def _votes(rng: np.random.Generator) -> Case:
@@ -293,7 +293,7 @@ def _telling(rng: np.random.Generator, voting: bool, about: int | None = None
              ) -> list[list[Any]]:
     """Sequences that once told that something was missing, at other times and values."""
     def change(*names: str) -> Case:
-        return _change(rng, names)
+        return random_change(rng, names)
 
     def soon() -> float:
         return log_uniform(rng, 0.004, 0.6) if rng.random() < 0.8 else 0.0

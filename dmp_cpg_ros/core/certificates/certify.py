@@ -43,6 +43,10 @@ from dmp_cpg_ros.core.transformation.foot_path import FootPath
 BEFORE_VOTES = 'time_to_walking'
 """Name of the last row before those of votes."""
 
+OSCILLATOR_ROWS = (*of_network.NETWORK_ROWS, 'rest_radius')
+"""Names of required rows that depend on the oscillators alone, after which others may be missing.
+"""
+
 
 def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = False,
             until_lost: bool = False, until: str = '') -> Certificate:
@@ -62,7 +66,8 @@ def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = Fal
         Whether rows after a required one that does not hold may be missing: so it is known at a
         fraction of the cost that the certificate does not hold.
     until : str
-        Name of a row after which others may be missing; of ``BEFORE_VOTES`` or any other one.
+        Name of a row after which others may be missing: one of ``OSCILLATOR_ROWS`` or
+        ``BEFORE_VOTES``.
 
     Returns
     -------
@@ -105,6 +110,9 @@ def _certificate(s: Setting, required_only: bool, until_lost: bool, until: str,
         if row.name == until or (until_lost and not row.holds):
             return Certificate(tuple(rows), contraction.reach, s.span.omega[1])
     rest = analysis.rest
+    at_rest = rest_inequalities(s, rest)
+    if until in OSCILLATOR_ROWS or (until_lost and not at_rest[-1].holds):
+        return Certificate((*rows, at_rest[-1]), contraction.reach, s.span.omega[1])
     rates = (found.rate, max(contraction.rate, analysis.capture.rate), 2.0 * p.rho * p.radius**2)
     slowest = min(rate for rate in rates if rate > 0.0)       # rates that there are to keep
     step = stepped_network(s, analysis) if all(row.holds for row in rows) else None
@@ -114,8 +122,7 @@ def _certificate(s: Setting, required_only: bool, until_lost: bool, until: str,
     start = time_to_walking(s, found, rest)
     if not required_only:
         rows.append(of_network.capture_anywhere(s, analysis))
-    rows += [*step_inequalities(s, slowest, step), *hierarchy_inequalities(s, found),
-             *rest_inequalities(s, rest)]
+    rows += [*step_inequalities(s, slowest, step), *hierarchy_inequalities(s, found), *at_rest]
     if not required_only:
         rows.append(of_network.mismatch_inequality(s, found))
     contact = None

@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.core.canonical.coupling import degrees
 from dmp_cpg_ros.core.canonical.inhibition import AUTO, Inhibition
-from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, certify
+from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, OSCILLATOR_ROWS, certify
 from dmp_cpg_ros.core.certificates.changes import all_networks, certify_changes, votes_among
 from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, lost
-from dmp_cpg_ros.core.certificates.network import NETWORK_ROWS, Setting
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.timing import later_arming
 from dmp_cpg_ros.core.certificates.votes import VOTE_ROWS
 from dmp_cpg_ros.core.contraction.capture import RADIUS_TOLERANCE, capture_set
@@ -41,6 +42,10 @@ UNCERTIFIED = frozenset(
 _CAPTURING = frozenset(('rho', 'radius', 'coupling_gain', 'coupling_graph', 'inhibition_gain',
                         'region_radius', 'inhibited_legs'))
 """Parameters that decide which set inhibition holds the legs in."""
+
+_WHOLE_EFFORT, _VOTES_EFFORT = 4, 4
+"""Of a whole certificate, and of what one set of voters can do in one network."""
+
 
 @dataclass(frozen=True)
 class Running:
@@ -87,7 +92,7 @@ class Running:
         if among in VOTE_ROWS:
             failing = lost(self.votes(until_lost=True))
         else:
-            until = among if among in NETWORK_ROWS else BEFORE_VOTES if among else ''
+            until = among if among in OSCILLATOR_ROWS else BEFORE_VOTES if among else ''
             failing = _certificate(self._of_certificate, False, True, until).failing
         return failing[0].name if failing else ''
 
@@ -97,13 +102,21 @@ class Running:
         return votes_among(of.parameters, of.networks, of.tick_s, until_lost=until_lost)
 
     def effort(self, among: str = '') -> int:
-        """How long :meth:`first_lost` takes: number of networks, times that of sets of voters
-        where it looks at votes.
+        """How long :meth:`first_lost` takes at most, but for single ones, in rows of one network
+        that concern oscillators alone: the whole certificate takes some of them for each leg that
+        may be chosen and is not alike another, and votes for each network and set of voters.
         """
-        networks, voting = self.networks, self.parameters.voting
-        votes = voting.voting and (not among or among in VOTE_ROWS)
-        return len(networks) * (1 + votes * len(
-            different_voters(networks[0].system, voting.majority)))
+        kinds, eligible, votes = 1, 0, 0
+        if self.parameters.inhibition.auto:
+            kinds = eligible = len(set(degrees(
+                self.parameters.canonical.coupling_graph, len(LEGS))))
+        if self.parameters.voting.voting and (not among or among in VOTE_ROWS):
+            networks = self.networks
+            votes = _VOTES_EFFORT * len(networks) * len(
+                different_voters(networks[0].system, self.parameters.voting.majority))
+        if among in VOTE_ROWS:
+            return votes
+        return votes + eligible + kinds * (1 if among in OSCILLATOR_ROWS else _WHOLE_EFFORT)
 
     @property
     def networks(self) -> list[GaitNetwork]:

@@ -89,11 +89,12 @@ def suggest_gains(running: Running) -> Suggestion | None:
 
 
 def nearest_values(numbers: Mapping[str, tuple[float, float]],
-                   lost: Callable[[dict[str, float], str], str], name: str, rounds: int
-                   ) -> dict[str, float]:
+                   lost: Callable[[dict[str, float], str], str], name: str,
+                   halved: Callable[[str], tuple[str, int]]) -> dict[str, float]:
     """Values nearest to the wanted ones, on the straight way from those that run, that still work.
 
-    What one inequality needs is looked for first; then whether the others hold there.
+    What one inequality needs is looked for first, where it alone is easier to look at; then
+    whether the others hold there.
 
     Parameters
     ----------
@@ -104,8 +105,9 @@ def nearest_values(numbers: Mapping[str, tuple[float, float]],
         that need not be looked at.
     name : str
         An inequality that the wanted values lose.
-    rounds : int
-        How often the way is halved.
+    halved : callable (name) → (str, int)
+        For a lost inequality, what is looked at on the way, it or all, and how often the way is
+        halved; 0 ends it with what runs.
 
     Returns
     -------
@@ -121,8 +123,9 @@ def nearest_values(numbers: Mapping[str, tuple[float, float]],
 
     share = 1.0
     while name and share > 0.0:
-        share = last_that_holds(partial(kept, share, name), 0.0, 1.0, rounds)
-        name = lost(between(share), '') if share > 0.0 else ''
+        among, rounds = halved(name)
+        share = last_that_holds(partial(kept, share, among), 0.0, 1.0, rounds)
+        name = lost(between(share), '') if among and share > 0.0 else ''
     return {key: _shortened(value, numbers[key][0]) for key, value in between(share).items()}
 
 

@@ -319,26 +319,31 @@ def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed
 
 
 def _in_a_block(of: _Falling) -> tuple[Array, Array]:
-    """Matrices that make of bounds, and of what feeds them in each cell of a block, the bounds at
-    the ends of all its cells, the first included.
+    """Matrices that make of bounds, and of what feeds them in each cell of a block, those at the
+    ends of all its cells, the first included.
     """
-    n, powers = len(of.start), [np.eye(len(of.start))]
-    for _ in range(_BLOCK):
-        powers.append(of.carry @ powers[-1])
-    feed = np.stack([of.turning, of.away], axis=1)
-    fed = np.zeros((_BLOCK + 1, n, _BLOCK, 2))
-    for late in range(_BLOCK):
-        fed[np.arange(late + 1, _BLOCK + 1), :, np.arange(_BLOCK - late)] = powers[late] @ feed
-    return np.concatenate(powers), fed.reshape((_BLOCK + 1) * n, 2 * _BLOCK)
+    n, carry = len(of.start), of.carry
+    powers = np.eye(n)
+    while len(powers) < _BLOCK * n:
+        powers, carry = np.concatenate([powers, powers @ carry]), carry @ carry
+    fed = np.zeros((_BLOCK + 1, n, 2))                           # the last: of cells to come
+    fed[:_BLOCK] = (powers @ np.stack([of.turning, of.away], axis=1)).reshape(_BLOCK, n, 2)
+    return np.concatenate([powers, carry]), fed.swapaxes(0, 1)[:, _SINCE].swapaxes(0, 1).reshape(
+        (_BLOCK + 1) * n, 2 * _BLOCK)
+
+
+_CELLS = np.arange(_BLOCK + 1)
+_LATER = _CELLS[:, None] - _CELLS
+_SINCE = np.where(_LATER > 0, _LATER - 1, _BLOCK)[:, :-1]
+"""Cells between one of a block that is fed and the end of another, ndarray (_BLOCK + 1, _BLOCK);
+_BLOCK where that comes first.
+"""
 
 
 def _filtered(kept: float) -> Array:
     """Matrix that makes of the first value of a filter and what it follows in each cell of a block
     its values at the ends of all cells, the first included.
     """
-    weights = np.zeros((_BLOCK + 1, _BLOCK + 1))
-    weights[0, 0] = 1.0
-    for k in range(_BLOCK):
-        weights[k + 1] = kept * weights[k]
-        weights[k + 1, k + 1] = 1.0 - kept
+    weights = np.where(_LATER >= 0, (1.0 - kept) * kept ** np.maximum(_LATER, 0), 0.0)
+    weights[:, 0] = kept ** _CELLS
     return weights

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from typing import Any
 
 from dmp_cpg_ros.core.canonical.inhibition import AUTO
+from dmp_cpg_ros.core.certificates.certify import OSCILLATOR_ROWS
 from dmp_cpg_ros.core.certificates.changes import refused_change
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality
@@ -25,12 +27,12 @@ from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.parameters import typed
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
-_ROUNDS, _FEWER_ROUNDS = 5, 3
-"""How often the way to what is refused is halved: of one gait without votes, and else."""
+_ROUNDS = 5
+"""How often the way to what is refused is halved at most."""
 
-MOST_EFFORT = 24
+MOST_EFFORT = 30
 """Most :meth:`Running.effort` of a verdict that looks for what would work, for its time to stay
-bounded: about 2 ms each on a slow core."""
+bounded: about 1.5 ms each on a slow core."""
 
 
 @dataclass(frozen=True)
@@ -110,9 +112,19 @@ class Change:
     def _settled(self) -> Change:
         return replace(self, present=self.present.settled, proposed=self.proposed.settled)
 
+    @property
+    def _judging(self) -> int:
+        """Effort of a verdict that does not look for what would work: of the certificate, of the
+        changes from what is walked to another gait, and of the votes that were not looked at.
+        """
+        of, before = self.proposed, self.present
+        others = (of.gait, of.others) != (before.gait, before.others)
+        return of.effort() * (1 + others) + (
+            before.parameters.voting.voting and not self.held.holds) * before.effort(VOTE_ROWS[0])
+
     def _nearest(self, held: bool, name: str) -> str:
         """Nearest values that work, as text, where an inequality of a name is lost."""
-        looks = _Looks(MOST_EFFORT - self.proposed.effort())
+        looks = _Looks(MOST_EFFORT - self._judging)
         differences = self.present.differences(self.proposed)
         numbers = {name: pair for name, pair in differences.items() if isinstance(pair[0], float)}
         words = {name: pair[1] for name, pair in differences.items() if name not in numbers}
@@ -123,12 +135,11 @@ class Change:
             return 'nothing nearer is known: the running parameters are not certified themselves'
         values = nearest_values(
             numbers, lambda at, among: looks.first_lost(with_words.changed(at), among),
-            name, _FEWER_ROUNDS if self.present.others or self.proposed.values['voting']
-            else _ROUNDS)
+            name, partial(looks.halved, with_words))
         none = values == {name: before for name, (before, _) in numbers.items()}
         if none and words and looks.first_lost(with_words):
             return self._choices(words, looks)
-        if none and looks.left <= 0:
+        if none and looks.spent:
             return _TOO_LONG
         told = ', '.join(f'{name} = {typed(value)}' for name, value in values.items())
         return f'nearest value{"s that work" if len(values) > 1 else " that works"}: {told}'
@@ -147,7 +158,7 @@ class Change:
                     working.append(typed(choice))
             if working:
                 found.append(f'{name} = {" or ".join(working)}')
-            elif looks.left > 0:
+            elif not looks.spent:
                 found.append(f'no other {name} with the rest as it is')
         return f'what works: {"; ".join(found)}' if found else _TOO_LONG
 
@@ -162,12 +173,26 @@ class _Looks:
     """
 
     left: int
+    spent: bool = False
+
+    def halved(self, running: Running, name: str) -> tuple[str, int]:
+        """What to look at on the way to what loses an inequality, it where that is much less than
+        all, which has to be looked at in the end; and how often the way may be halved.
+        """
+        whole, alone = running.effort(), running.effort(name)
+        among, most = (name, (self.left - whole) // alone) if 2 * alone <= whole else (
+            '', self.left // whole)
+        self.spent = self.spent or most < 1
+        return among, max(0, min(most, _ROUNDS))
 
     def first_lost(self, running: Running, among: str = '') -> str:
         """:meth:`Running.first_lost`, or that it is not known."""
-        effort = running.effort(among)
-        self.left = self.left - effort if self.left >= effort else 0
-        return _first_lost(running, among) if self.left > 0 else 'unknown'
+        if self.left < running.effort(among):
+            self.spent = True
+            return 'unknown'
+        lost = _first_lost(running, among)
+        self.left -= running.effort(lost if lost in OSCILLATOR_ROWS else among)
+        return lost
 
 
 def _first_lost(running: Running, among: str = '') -> str:

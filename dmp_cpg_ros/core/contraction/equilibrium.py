@@ -52,8 +52,8 @@ class InhibitedEquilibrium:
     slowest_rate: float
 
 
-def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array, gains: Array,
-                          near: Array | None = None) -> InhibitedEquilibrium | None:
+def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array, gains: Array
+                          ) -> InhibitedEquilibrium | None:
     """Equilibrium that grows out of the resting targets as ω rises from zero, by Newton's method.
 
     Parameters
@@ -64,23 +64,31 @@ def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array, gains: 
         Angular frequencies [rad/s].
     gains : ndarray (N,)
         Inhibition gains α_i that act [1/s].
-    near : ndarray (N, 2), optional
-        Stable equilibrium under gains that are not very different: Newton's method begins there,
-        and on the way from the resting targets only where it finds no stable one.
 
     Returns
     -------
     InhibitedEquilibrium or None
         None when the equilibrium ceases to exist before ω is reached: the oscillators break free.
     """
-    if near is not None:
-        x = _newton(system, near, np.asarray(omega), gains)
-        found = None if x is None else _described(system, x, omega, gains)
-        if found is not None and found.slowest_rate > 0.0:
-            return found
+    return equilibrium_up_to(system, omega, gains)[0]
+
+
+def stable_equilibrium_near(system: CanonicalSystem, omega: float | Array, gains: Array,
+                            near: Array) -> InhibitedEquilibrium | None:
+    """Stable equilibrium that Newton's method finds from a state (N, 2); None: it finds none."""
+    x = _newton(system, near, np.asarray(omega), gains)
+    found = None if x is None else _described(system, x, omega, gains)
+    return found if found is not None and found.slowest_rate > 0.0 else None
+
+
+def equilibrium_up_to(system: CanonicalSystem, omega: float | Array, gains: Array
+                      ) -> tuple[InhibitedEquilibrium | None, float]:
+    """:func:`inhibited_equilibrium`, and the share of ω up to which it exists; 0 where there is
+    none to begin with.
+    """
     x = _newton(system, system.target.copy(), 0.0 * np.asarray(omega), gains)
     if x is None:
-        return None
+        return None, 0.0
     share, step = 0.0, 0.5
     for _ in range(_MOST_STEPS):
         ahead = min(1.0, share + step)
@@ -91,7 +99,7 @@ def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array, gains: 
             step *= 0.4
         if share == 1.0 or (following is None and step <= _SMALLEST_STEP):
             break
-    return None if share < 1.0 else _described(system, x, omega, gains)
+    return None if share < 1.0 else _described(system, x, omega, gains), share
 
 
 def _described(system: CanonicalSystem, x: Array, omega: float | Array, gains: Array

@@ -15,7 +15,11 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.capture import capture_set
-from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium, inhibited_equilibrium
+from dmp_cpg_ros.core.contraction.equilibrium import (
+    InhibitedEquilibrium,
+    equilibrium_up_to,
+    stable_equilibrium_near,
+)
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, NONE, inhibited_contraction
 from dmp_cpg_ros.core.contraction.voting import (
     SPARE,
@@ -99,12 +103,18 @@ def rest_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequen
     def room(alpha: float) -> float:
         nonlocal rest
         gains = _votes(system, voters, alpha)
-        found = inhibited_equilibrium(system, omega, gains, None if rest is None else rest.state)
-        if found is None or not found.slowest_rate > 0.0:
-            return -np.inf
+        found = None if rest is None else stable_equilibrium_near(
+            system, omega, gains, rest.state)
+        if found is None:
+            found, share = equilibrium_up_to(system, omega, gains)
+            if found is None:                     # which needs ω/share, or about α/share
+                return log(share) if share > 0.0 else -np.inf
+        stable = found.slowest_rate / alpha                       # it passes 0 at a threshold
+        if not stable > 0.0:
+            return stable if stable < 0.0 else -np.inf
         rest = found
         farthest = float(rest.distance[gains > 0.0].max())
-        return log(region_radius / farthest) if farthest > 0.0 else np.inf
+        return min(stable, log(region_radius / farthest)) if farthest > 0.0 else stable
 
     scale = _scale(system, omega, region_radius)
     first = min(known, 1.2 * scale / len(voters))

@@ -190,7 +190,10 @@ def test_the_nearest_value_that_works_works_and_a_little_further_does_not() -> N
         return among if among in failing else '' if among or not failing else failing[0]
 
     wanted = {'inhibition_gain': (400.0, 100.0)}
-    found = nearest_values(wanted, lost, lost({'inhibition_gain': 100.0}), 8)
+    found = nearest_values(wanted, lost, lost({'inhibition_gain': 100.0}),
+                           lambda name: (name, 8))
     assert not lost(found) and lost({'inhibition_gain': found['inhibition_gain'] - 1.2})
-    assert nearest_values(wanted, lost, 'synchronisation', 8) == found  # which holds everywhere
+    for among in ('synchronisation', ''):  # which holds everywhere, and all
+        assert found == nearest_values(
+            wanted, lost, 'synchronisation', lambda _, at=among: (at, 8))
     assert PostureParameters() == SuiteParameters().posture

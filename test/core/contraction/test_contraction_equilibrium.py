@@ -13,7 +13,11 @@ from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
+from dmp_cpg_ros.core.contraction.equilibrium import (
+    equilibrium_up_to,
+    inhibited_equilibrium,
+    stable_equilibrium_near,
+)
 
 
 def system(name: str, gain: float, size: int = 4, rho: float = 8.0) -> CanonicalSystem:
@@ -49,10 +53,21 @@ def test_from_a_rest_nearby_it_is_the_one_that_grows_out_of_the_targets(
     gains[node] = 600.0
     nearby = inhibited_equilibrium(network, omega, other * gains)
     assume(nearby is not None and nearby.slowest_rate > 0.0)
-    near = inhibited_equilibrium(network, omega, gains, nearby.state)
+    near = stable_equilibrium_near(network, omega, gains, nearby.state)
     grown = inhibited_equilibrium(network, omega, gains)
-    assert (near is None) == (grown is None)
     assert near is None or np.abs(near.state - grown.state).max() < 1e-8
+
+
+@pytest.mark.parametrize('omega', [2.0, 5.0, 10.0, 20.0])
+@pytest.mark.parametrize('name', ['all_to_all', 'ring', 'path'])
+def test_a_rest_ceases_at_one_frequency_whatever_share_of_another_that_is(
+        name: str, omega: float) -> None:
+    network, gains = system(name, 100.0), np.array([0.0, 5.0, 0.0, 0.0])
+    none, share = equilibrium_up_to(network, omega, gains)
+    assert none is None and 0.0 < share < 1.0
+    assert inhibited_equilibrium(network, omega * share, gains) is not None
+    _, other = equilibrium_up_to(network, 1.4, gains)
+    assert share * omega == pytest.approx(1.4 * other, abs=0.003 * omega)
 
 
 @pytest.mark.parametrize(('gain', 'omega'), [(10.0, 8.8), (30.0, 8.8), (100.0, 8.8)])
