@@ -141,7 +141,8 @@ class _Claimed:
                 y, dtype=float)
             if rest is None:
                 return {}
-            off = np.linalg.norm(rest.state - states, axis=1) / self.v
+            found = 2.0 * rest.residual / max(rest.slowest_rate, 1.0)  # how exactly it is
+            off = (np.linalg.norm(rest.state - states, axis=1) - found) / self.v
             claims[f'equilibrium at {at:.3g}'] = (
                 float(off.max()) * _LESS - 1e-9 * self.r <= float(error))
             near = np.linalg.norm(states - self.target, axis=1)[self.held].max()
