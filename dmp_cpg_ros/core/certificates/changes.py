@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, zip_longest
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, certify
@@ -72,7 +72,8 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
     arriving = abs((acting_cadence or cadence) - cadence) / CADENCE_RATE
     ways = [GaitTransition(one, other) for one, other in combinations(gaits, 2)]
     share = max((way.fastest(rate) for way in ways), default=0.0)
-    span = _widened(p, networks, share)
+    spans = [operating_range(network, p.inhibition, p.reference) for network in networks]
+    span = _widened(spans, share)
     unvoted = replace(p, voting=VotingParameters())
     setting = Setting.of(networks[0], unvoted, tick_s, span, 2.0 * math.pi if ways else max(
         farthest_way(network, p.inhibition) for network in networks))
@@ -87,7 +88,7 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
             for row in whole.inequalities]
     rows = discharged(rows, alike=replace(setting, parameters=p).alike)
     if until != BEFORE_VOTES and not (required_only and lost(rows)):
-        rows += votes_among(p, networks, tick_s, until_lost=until_lost)
+        rows += votes_among(p, networks, tick_s, spans, until_lost=until_lost)
     if ways and not required_only:
         rows.append(Inequality(
             'offset_rate', share * span.omega[1], whole['frequency_mismatch'].right, 'rad/s',
@@ -120,15 +121,16 @@ def refused_change(parameters: SuiteParameters, walked: Sequence[Gait], wanted: 
             f'{certificate.explained()}')
 
 
-def votes_among(p: SuiteParameters, networks: Sequence[GaitNetwork], tick_s: float, *,
-                until_lost: bool = False) -> list[Inequality]:
+def votes_among(p: SuiteParameters, networks: Sequence[GaitNetwork], tick_s: float,
+                spans: Sequence[OperatingRange] = (), *, until_lost: bool = False
+                ) -> list[Inequality]:
     """What votes can do in some networks, of each inequality the worst, or all of the first in
     which one fails: their clamp follows the cadence, and a stop waits until a change of gait is
     over.
     """
     worst: dict[str, Inequality] = {}
-    for network in networks:
-        for row in vote_inequalities(Setting.of(network, p, tick_s, way=2.0 * math.pi)):
+    for network, span in zip_longest(networks, spans):
+        for row in vote_inequalities(Setting.of(network, p, tick_s, span, 2.0 * math.pi)):
             known = worst.get(row.name)
             if known is None or not row.margin > known.margin:
                 worst[row.name] = replace(
@@ -163,8 +165,9 @@ def _changed(row: Inequality, bound: float, leg: LegParameters, what: str) -> In
 def all_networks(p: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,
                  acting_cadence: float | None) -> list[GaitNetwork]:
     """Networks of all gaits, at the cadence of the parameters and at the one that acts."""
-    return [GaitNetwork(replace(p.canonical, cadence_scale=cadence), gait, scale)
-            for cadence in _cadences(p, acting_cadence) for gait in gaits]
+    oscillators = [replace(p.canonical, cadence_scale=cadence)
+                   for cadence in _cadences(p, acting_cadence)]
+    return [GaitNetwork(canonical, gait, scale) for canonical in oscillators for gait in gaits]
 
 
 def _cadences(p: SuiteParameters, acting_cadence: float | None) -> list[float]:
@@ -173,10 +176,8 @@ def _cadences(p: SuiteParameters, acting_cadence: float | None) -> list[float]:
     return list(dict.fromkeys((cadence, acting_cadence or cadence)))
 
 
-def _widened(p: SuiteParameters, networks: Sequence[GaitNetwork], share: float) -> OperatingRange:
-    """Range of all blends, with frequencies that differ by a share."""
-    spans = [operating_range(network, p.inhibition, p.reference) for network in networks]
-
+def _widened(spans: Sequence[OperatingRange], share: float) -> OperatingRange:
+    """Range of all blends of gaits with some ranges, with frequencies that differ by a share."""
     def widened(pairs: list[tuple[float, float]]) -> tuple[float, float]:
         slowest, fastest = zip(*pairs, strict=True)
         return (1.0 - share) * min(slowest), (1.0 + share) * max(fastest)

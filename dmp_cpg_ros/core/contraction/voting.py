@@ -166,18 +166,28 @@ def different_voters(system: CanonicalSystem, count: int) -> list[tuple[int, ...
         Empty for no voters.
     """
     sets = combinations(range(system.graph.size), count) if count > 0 else ()
-    return [voters for voters in sets if voters == alike(system, voters)]
+    turns = _turns(system)
+    return [voters for voters in sets if voters == _first(turns, voters)]
 
 
 def alike(system: CanonicalSystem, nodes: Sequence[int]) -> tuple[int, ...]:
     """First of the sets of nodes that the network cannot tell from one."""
+    return _first(_turns(system), nodes)
+
+
+def _first(turns: Sequence[tuple[int, ...]], nodes: Sequence[int]) -> tuple[int, ...]:
+    return min(tuple(sorted(turn[i] for i in nodes)) for turn in turns)
+
+
+def _turns(system: CanonicalSystem) -> Sequence[tuple[int, ...]]:
+    """Permutations of the nodes that the network cannot tell from none."""
     graph = system.graph
     if graph.size > MOST_PERMUTED:
-        return tuple(sorted(nodes))
+        return [tuple(range(graph.size))]
     L = graph.block_laplacian() if graph.weights is None else graph.comparison
     shape = np.round(L / max(float(np.abs(L).max()), 1e-300), 9) + 0.0        # no negative zero
-    return min(tuple(sorted(turn[i] for i in nodes)) for turn in _symmetries(
-        graph.size, shape.tobytes(), np.stack([system.rho, system.radius], axis=1).tobytes()))
+    return _symmetries(graph.size, shape.tobytes(),
+                       np.stack([system.rho, system.radius], axis=1).tobytes())
 
 
 @lru_cache(32)
