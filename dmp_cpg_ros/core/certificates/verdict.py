@@ -179,7 +179,7 @@ class _Looks:
         """What to look at on the way to what loses an inequality, it where that is much less than
         all, which has to be looked at in the end; and how often the way may be halved.
         """
-        whole, alone = running.effort(), running.effort(name)
+        whole, alone = running.effort(), max(1, running.effort(name))
         among, most = (name, (self.left - whole) // alone) if 2 * alone <= whole else (
             '', self.left // whole)
         self.spent = self.spent or most < 1
