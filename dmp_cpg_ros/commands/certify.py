@@ -126,7 +126,8 @@ def _report(suite: Suite, of: Running, certificate: Certificate, needed: votes.V
                   + (f"; {', '.join(others)} cannot hold the gait alone" if others else '')]
     return [*lines, '', f'from a request on the reference goes at most '
             f'{no_less(certificate.distance_to_rest)} m, at its largest speed',
-            f'in real time {lead:g} s later, and time_to_rest is {2.0 * lead:g} s longer, '
+            f'in real time {lead:g} s later, and time_to_rest is '
+            f'{of.time_ahead(lead):.4g} s longer, '
             f'time_to_walking {lead:g} s: request_lead, of the request and of arming', '',
             f'voting is {voting}; {_votes(needed)}',
             f'gains of each from which 1, 2, ... votes certainly stop it: {enough} 1/s; below '

@@ -162,7 +162,7 @@ def _walk(plan: _Plan, server: ForkServer) -> int:
           f'{SHARED[options.processes]}, '
           f'{1e9 / plan.suite.tick_ns:g} Hz', flush=True)
     bound = plan.certificate.time_to_rest + (
-        0.0 if options.lock_step else 2.0 * plan.suite.request_lead_s)
+        0.0 if options.lock_step else running(plan.suite).time_ahead(plan.suite.request_lead_s))
     print(f'certificate: {plan.certificate.explained()}; {plan.certificate.contraction_grade} '
           f'grade; at rest at most {no_less(bound)} s after a request', flush=True)
     made = 'metrics' if options.no_report else 'report'

@@ -73,18 +73,19 @@ class InhibitionNode(SuiteNode):
         self.certified = Certified(self, self._acting_now)
         gaits = self.certified.gaits
         self._inbox, self._weight = VoteInbox(), description_of(self).mass * GRAVITY
+        self._lead_ns = 0 if self.lock_step else round(
+            1e9 * self.parameters_of(RequestParameters).request_lead)
         self._build()
         self._network = self._slow = self._running_gait.network(gaits.named(gait_name(self)))
         self._votes = self._voting.initial_state(self._network)
         self._state = self._supervisor.initial_state(
             leg=self.parameters_of(CanonicalParameters).first_leg)
         self._announced = Announced(self._supervisor.inhibition(self._state))
-        self._lead_ns = 0 if self.lock_step else round(
-            1e9 * self.parameters_of(RequestParameters).request_lead)
         self._x: Any = None
         self._x_dot: Any = None
         self._r, self._body_mode = np.zeros(3), 'standing'
-        self._promises, self._anew = Promises(self, self.certified, self._network.gait), False
+        self._promises, self._anew = Promises(
+            self, self.certified, self._network.gait, self._lead_ns), False
         self._waiting = WaitingRequests()
         self._blind = ''
         self._drive, self._joined, self._asked = FOLLOWING, False, False
@@ -132,7 +133,7 @@ class InhibitionNode(SuiteNode):
 
     def _build(self) -> None:
         of = self.parameters_of
-        self._supervisor = self.certified.supervisor()
+        self._supervisor = self.certified.supervisor(self._lead_ns)
         self._voting = Voting(of(InhibitionParameters), of(VotingParameters),
                               of(VoteSourceParameters), of(ReferenceParameters), self._weight)
         self._reference = self.certified.reference()
@@ -399,7 +400,7 @@ class InhibitionNode(SuiteNode):
         canonical = CanonicalState(present, wanted, self._slow.gait.cadence_scale, self._x,
                                    self._x_dot, initial_contact_state())
         self._promises.make(Present(
-            state, self._announced, self._lead_ns, canonical, self._slow, self._r,
+            state, self._announced, canonical, self._slow, self._r,
             self._gate.foreseen(state.time_ns + tick_ns), self._barring), known)
 
     # What is told ------------------------------------------------------------------------------

@@ -55,7 +55,7 @@ class Oscillators(WalkingLoop):
         self._early: tuple[int, Inhibition] = (0, self.inhibition)
         nothing = np.full(3, np.nan)
         self._sensors = VoteSensors(0, 0, np.full(4, 0.25), nothing, nothing)
-        self._leave_out_places()
+        self._adapt()
 
     def _described(self, parameters: SuiteParameters, gait: Any) -> Running:
         running = super()._described(parameters, gait)
@@ -66,14 +66,14 @@ class Oscillators(WalkingLoop):
     def change(self, values: Mapping[str, Any]) -> str:
         """Change parameters; the condition that is left out stays left out."""
         told = super().change(values)
-        self._leave_out_places()
+        self._adapt()
         return told
 
-    def _leave_out_places(self) -> None:
-        if self._weaken == 'places':
-            of = self.supervisor
-            self.supervisor = _Hasty(
-                of.parameters, of.voting, of.activity_rate, of.reference)
+    def _adapt(self) -> None:
+        """Tell the supervisor its lead, and leave out the places where that is wanted."""
+        of = self.supervisor
+        self.supervisor = (_Hasty if self._weaken == 'places' else GaitSupervisor)(
+            of.parameters, of.voting, of.activity_rate, of.reference, self._lead_ns)
 
     def certified(self) -> bool:
         """Whether the present parameters have a certificate."""
@@ -99,9 +99,10 @@ class Oscillators(WalkingLoop):
 
     def time_to_rest(self) -> float:
         """Bound that is stated for a stop that was requested now [s]."""
-        leads = 0.0 if self._weaken == 'leads' else 2.0 * self.lead_s  # of the request, of arming
+        running = self.in_force()
+        leads = 0.0 if self._weaken == 'leads' else running.time_ahead(self.lead_s)
         if self._weaken == 'arming':
-            return self.in_force().certificate().time_to_rest + leads
+            return running.certificate().time_to_rest + leads
         return super().time_to_rest() + leads
 
     def stop_distance(self) -> float:
@@ -118,7 +119,7 @@ class Oscillators(WalkingLoop):
         self._announced = self._announced.after(self.stop, self.inhibition, self._lead_ns)
         return look_ahead(
             self.supervisor, self.reference, self.canonical, self.stop, self._announced,
-            self.canon, self.r, self._foreseen, self._dt, lead_ns=self._lead_ns).time_s
+            self.canon, self.r, self._foreseen, self._dt).time_s
 
     def in_force(self) -> Running:
         """What runs, in the gait in force or in the change between two when a request acts."""
@@ -148,7 +149,7 @@ class Oscillators(WalkingLoop):
         return look_ahead(
             self.supervisor, self.reference, self.canonical, self.stop,
             Announced(self.inhibition), self.canon, self.r,
-            self.gate.foreseen(self.now_ns + self.tick_ns), self._dt, lead_ns=self._lead_ns).time_s
+            self.gate.foreseen(self.now_ns + self.tick_ns), self._dt).time_s
 
     def forget(self) -> None:
         """Let the oscillators begin anew, who know where they are: what they hear last acts on

@@ -29,6 +29,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.entry import eligible_legs
 from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.reference.stop_distance import stop_distance
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import UNCERTIFIED_VOTES, VOTE_SOURCES, SuiteParameters
@@ -169,6 +170,18 @@ class Running:
         """
         return self.certificate().time_to_rest + time_to_slow(quickness) + later_arming(
             Setting.of(network, self.parameters, self.tick_s), x, r)
+
+    def time_ahead(self, lead_s: float) -> float:
+        """What it adds to the time to rest that a request, and inhibition that is armed, act a
+        lead later [s]; of any leg one is armed that is not yet past C by then however fast it is,
+        and comes there as much later as it may be slower.
+        """
+        if not (self.parameters.inhibition.auto and lead_s > 0.0):
+            return 2.0 * lead_s
+        slowest, fastest = zip(*(operating_range(
+            network, self.parameters.inhibition, self.parameters.reference).omega_armed
+            for network in self.networks), strict=True)
+        return lead_s * (1.0 + max(fastest) / min(slowest))
 
     def stop_distance(
             self, r: Array, command: tuple[float, float, float], lead_s: float = 0.0) -> float:

@@ -25,6 +25,7 @@ from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork, network_system
+from dmp_cpg_ros.core.gait.running import CADENCE_RATE
 from dmp_cpg_ros.core.gait.transition import BlendedGait
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
@@ -97,22 +98,58 @@ def _holds(p: CanonicalParameters, leg: int, gain: float, region_radius: float, 
             and float(rest.radius.min()) > SMALLEST_RADIUS * p.radius)
 
 
-def next_leg(network: GaitNetwork, inhibition: InhibitionParameters, x: Array
-             ) -> tuple[int, float]:
-    """Eligible leg whose oscillator is in its C, or the next to come there, and the phase of fl
-    at which the gait then rests [rad].
+def next_leg(network: GaitNetwork, inhibition: InhibitionParameters, x: Array,
+             ahead: float = 0.0, aimed: int | None = None) -> tuple[int, float]:
+    """Eligible leg whose oscillator is in its C, or the next to come there, when inhibition that
+    is armed now acts, and the phase of fl at which the gait then rests [rad].
+
+    Parameters
+    ----------
+    network, inhibition
+        What runs.
+    x : ndarray (4, 2)
+        States.
+    ahead : float
+        Largest way of the oscillators until then [rad].
+    aimed : int, optional
+        Leg for which it was armed before, which is kept until it has been in its C, for it is
+        there when that acts.
     """
     places, region = network.gait.phases.tolist(), inhibition.region_radius
     half = half_arc(region, network.parameters.radius)
     found = (2.0 * pi + 1.0, 0, 0.0)
     for leg in eligible_legs(network, inhibition):
         x_1, x_2 = x[leg].tolist()
-        off = x_1 - network.parameters.radius
-        inside = off * off + x_2 * x_2 <= region * region
-        way = 0.0 if inside else (-half - scalar_phase(x_1, x_2)) % (2.0 * pi)
+        at = scalar_phase(x_1, x_2)
+        if ahead > 0.0:
+            inside = (at + ahead + half) % (2.0 * pi) <= 2.0 * half
+            if leg == aimed and (half - at) % (2.0 * pi) <= ahead + 2.0 * half:
+                return leg, -places[leg] % (2.0 * pi)
+        else:
+            off = x_1 - network.parameters.radius
+            inside = off * off + x_2 * x_2 <= region * region
+        way = 0.0 if inside else (-half - at - ahead) % (2.0 * pi)
         # legs that go together are told apart by their order, not by rounding
         found = min(found, (round(way, 6), leg, -places[leg] % (2.0 * pi)))
     return found[1], found[2]
+
+
+def way_in(network: GaitNetwork, speed: float, span_s: float) -> float:
+    """Largest way of the oscillators within a time in which the feet get no faster [rad].
+
+    Parameters
+    ----------
+    network : GaitNetwork
+        That acts; its cadence may be on its way to that of its parameters.
+    speed : float
+        Of the feet [m/s].
+    span_s : float
+        The time [s].
+    """
+    acting, scale = network.gait.cadence_scale, network.scale
+    rising = min(max(network.parameters.cadence_scale, acting), acting + CADENCE_RATE * span_s)
+    omega = max(network.gait.omega(speed, scale), network.gait.omega(0.0, scale))
+    return span_s * omega * rising / acting
 
 
 def farthest_way(network: GaitNetwork, inhibition: InhibitionParameters) -> float:

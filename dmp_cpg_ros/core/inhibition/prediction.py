@@ -95,8 +95,7 @@ class Outlook(NamedTuple):
 def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
                   state: SupervisorState, published: Announced, canon: CanonicalState, r: Array,
                   command: tuple[float, float, float], dt: float, horizon: float = 10.0,
-                  body_mode: str = 'standing', lead_ns: int = 0
-                  ) -> Generator[None, None, Outlook]:
+                  body_mode: str = 'standing') -> Generator[None, None, Outlook]:
     """Run ahead from a request; every step of the generator is a tick of what is looked ahead.
 
     Parameters
@@ -117,8 +116,6 @@ def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canoni
         Tick, and longest time that is looked ahead [s].
     body_mode : str
         What the body does, assumed to stay.
-    lead_ns : int
-        Time from what is published until it acts [ns]; 0: it acts at the next tick.
 
     Returns
     -------
@@ -128,7 +125,7 @@ def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canoni
     down_s, way_m, speed, stop = 0.0, 0.0, hypot(r[0], r[1]), state.requested
     body, calming_s, followed = speed, CALMING, 1.0 - exp(-dt / FOLLOWING)
     ticks = ticks_ahead(supervisor, reference, canonical, state, published, canon, r, command, dt,
-                        body_mode, lead_ns)
+                        body_mode)
     for k, (state, _, canon, r) in zip(range(1, ceil(horizon / dt) + 1), ticks, strict=False):
         if state.requested != stop:
             break
@@ -168,8 +165,7 @@ def look_ahead(*arguments: Any, **options: Any) -> Outlook:
 
 def ticks_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
                 state: SupervisorState, published: Announced, canon: CanonicalState, r: Array,
-                command: tuple[float, float, float], dt: float, body_mode: str = 'standing',
-                lead_ns: int = 0
+                command: tuple[float, float, float], dt: float, body_mode: str = 'standing'
                 ) -> Iterator[tuple[SupervisorState, Inhibition, CanonicalState, Array]]:
     """Oscillators, reference and state of the stop tick by tick, without end; the parameters are
     those of :func:`looking_ahead`.
@@ -178,7 +174,7 @@ def ticks_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonica
     ------
     state : SupervisorState
     inhibition : Inhibition
-        What is published: without a lead what acts at the next tick.
+        What is published: without a lead of the supervisor what acts at the next tick.
     canon : CanonicalState
     r : ndarray (3,)
     """
@@ -190,8 +186,8 @@ def ticks_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonica
         canon = canonical.step(canon, r, published.acting, dt)
         state = supervisor.step(state, stamp_ns, canonical.network(canon.gait), canon.x,
                                 canon.x_dot, r, command, body_mode=body_mode,
-                                acts=lead_ns == 0 or published.stops)
-        published = published.after(state, supervisor.inhibition(state), lead_ns)
+                                acts=supervisor.lead_ns == 0 or published.stops)
+        published = published.after(state, supervisor.inhibition(state), supervisor.lead_ns)
         yield state, published.latest, canon, r
 
 

@@ -42,7 +42,7 @@ from dmp_cpg_ros.core.inhibition.caution import (
     followed_share,
     room,
 )
-from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg
+from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg, way_in
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, push_step
 from dmp_cpg_ros.core.inhibition.step_timing import fastest_lately, quickened, quickest
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
@@ -88,13 +88,15 @@ class GaitSupervisor:
         Rate at which the legs' swing activity follows the rates of their oscillators [1/s].
     reference : ReferenceParameters
         Limits of the commands, within which inhibition is armed.
+    lead_ns : int
+        Time after which a request and inhibition that is armed act [ns]; 0: at the next tick.
     """
 
     def __init__(self, parameters: InhibitionParameters, voting: VotingParameters,
-                 activity_rate: float, reference: ReferenceParameters) -> None:
+                 activity_rate: float, reference: ReferenceParameters, lead_ns: int = 0) -> None:
         """Keep the parts."""
         self.parameters, self.voting, self.activity_rate = parameters, voting, activity_rate
-        self.reference = reference
+        self.reference, self.lead_ns = reference, lead_ns
 
     def initial_state(self, time_ns: int = 0, leg: int = 0) -> SupervisorState:
         """At rest, a leg inhibited, or free when ``start_inhibited`` is false."""
@@ -117,8 +119,7 @@ class GaitSupervisor:
     def _gains(self, state: SupervisorState, armed: bool) -> Array:
         if not state.requested:
             return np.zeros(len(LEGS)) if state.push.acts else state.tally.gains
-        gains = (self.parameters.gains_on(state.leg) if armed and state.asked
-                 else np.zeros(len(LEGS)))
+        gains = self.parameters.gains_on(state.leg) * float(armed and state.asked)
         return joined_gains(gains, state.vote_gains, state.holds) if (
             armed and state.voted) else gains
 
@@ -175,9 +176,9 @@ class GaitSupervisor:
             state = state.carried(time_ns)
         gait, rates = network.gait, scalar_phase_rates(x, x_dot)
         speed = network.scale.foot_speed(*r.tolist())
-        omega, more = gait.omega(speed, network.scale), gait.rest_rate
-        activity = activities_step(state.activity, [rate + more for rate in rates],
-                                   gait.own_omegas(omega), self.activity_rate, dt)
+        activity = activities_step(
+            state.activity, [rate + gait.rest_rate for rate in rates],
+            gait.own_omegas(gait.omega(speed, network.scale)), self.activity_rate, dt)
         state = replace_unchecked(state, time_ns=time_ns, activity=activity)
         if body_mode != 'standing':
             state = self._barred(state, body_mode)
@@ -222,9 +223,8 @@ class GaitSupervisor:
         if state.idle_ns < 0:
             state = replace_unchecked(state, idle_ns=state.time_ns)
         waited = (state.time_ns - state.idle_ns) * 1e-9
-        if not state.asked and waited >= self.parameters.auto_delay:
-            return self.request(state, True, True)
-        return state
+        late = not state.asked and waited >= self.parameters.auto_delay
+        return self.request(state, True, True) if late else state
 
     def _blocked(self, state: SupervisorState, r: Array, command: tuple[float, float, float],
                  progress: Progress | None, network: GaitNetwork, body_mode: str, dt: float
@@ -302,7 +302,7 @@ class GaitSupervisor:
         if not inside:
             most = armed_speed(network.scale, self.parameters, self.reference)
             armed = speed <= most and self.in_places(network, x)
-            state = self._aimed(state, network, x, armed)
+            state = self._aimed(state, network, x, speed, armed)
             inside = self._inside(state, network, x)
         if not (armed and inside):
             return replace_unchecked(state, armed=armed, state='waiting')
@@ -318,18 +318,18 @@ class GaitSupervisor:
                                 rest_phase=state.rest_phase)
         return bool(network.acting_gains(once_armed, x).any())
 
-    def _aimed(self, state: SupervisorState, network: GaitNetwork, x: Array, armed: bool
-               ) -> SupervisorState:
+    def _aimed(self, state: SupervisorState, network: GaitNetwork, x: Array, speed: float,
+               armed: bool) -> SupervisorState:
         """State with the leg that is to be caught; once it is, it is kept."""
         leg, rest_phase = state.leg, 0.0
         if armed and state.asked and self.parameters.auto:
-            leg, rest_phase = next_leg(network, self.parameters, x)
-        if (leg, rest_phase) == (state.leg, state.rest_phase):
-            return state
-        return replace_unchecked(state, leg=leg, rest_phase=rest_phase)
+            leg, rest_phase = next_leg(network, self.parameters, x, way_in(
+                network, speed, 1e-9 * self.lead_ns), leg if state.armed else None)
+        same = (leg, rest_phase) == (state.leg, state.rest_phase)
+        return state if same else replace_unchecked(state, leg=leg, rest_phase=rest_phase)
 
     def in_places(self, network: GaitNetwork, x: Array) -> bool:
-        """Whether legs and radii are as close to their places as capture takes for granted."""
+        """Whether legs and radii are as close to their places as capture requires."""
         return in_places(network, x, self.parameters.region_radius)
 
     def _running(self, state: SupervisorState, errors: Array, speed: float) -> SupervisorState:
@@ -346,5 +346,5 @@ class GaitSupervisor:
     @staticmethod
     def _measured(state: SupervisorState) -> float:
         """Time from the request to now, kept once it has been set [s]."""
-        known = isfinite(state.measured_s)
-        return state.measured_s if known else (state.time_ns - state.request_ns) * 1e-9
+        return state.measured_s if isfinite(state.measured_s) else (
+            state.time_ns - state.request_ns) * 1e-9

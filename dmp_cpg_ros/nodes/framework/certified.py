@@ -301,12 +301,12 @@ class Certified:
         return RunningGait(of(CanonicalParameters), self._scale, self.gaits,
                            of(GaitChangeParameters), of(GaitChoiceParameters), quarter)
 
-    def supervisor(self) -> GaitSupervisor:
-        """What stops and starts the gait."""
+    def supervisor(self, lead_ns: int = 0) -> GaitSupervisor:
+        """What stops and starts the gait, told ahead by a time [ns]."""
         of = self._node.parameters_of
         return GaitSupervisor(
             of(InhibitionParameters), of(VotingParameters), of(LegParameters).activity_rate,
-            of(ReferenceParameters))
+            of(ReferenceParameters), lead_ns)
 
     def commands(self) -> CommandGate:
         """What comes on ``cmd_vel``, limited."""

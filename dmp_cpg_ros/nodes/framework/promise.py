@@ -101,8 +101,6 @@ class Present(NamedTuple):
         The request included.
     announced : Announced
         What has been published; in lock-step before the request.
-    lead_ns : int
-        Time from what is published until it acts [ns]; 0: it acts at the next tick.
     canonical : CanonicalState
         Of the oscillators.
     slow : GaitNetwork
@@ -117,7 +115,6 @@ class Present(NamedTuple):
 
     state: SupervisorState
     announced: Announced
-    lead_ns: int
     canonical: CanonicalState
     slow: GaitNetwork
     r: Array
@@ -137,6 +134,8 @@ class Promises:
         Its certificate, and the blocks that run.
     gait : GaitInForce
         That is walked now.
+    lead_ns : int
+        Time after which what is requested acts [ns]; 0: at the next tick.
 
     Attributes
     ----------
@@ -148,10 +147,11 @@ class Promises:
         With which it was predicted, v_x, v_y [m/s], γ [rad/s].
     """
 
-    def __init__(self, node: SuiteNode, certified: Certified, gait: GaitInForce) -> None:
+    def __init__(self, node: SuiteNode, certified: Certified, gait: GaitInForce, lead_ns: int
+                 ) -> None:
         """Promise nothing yet."""
         self.latest, self.due_ns, self.command = Promise(), inf, (0.0, 0.0, 0.0)
-        self._node, self._certified = node, certified
+        self._node, self._certified, self._lead_ns = node, certified, lead_ns
         self._slices = Slices(node, PREDICTED_AT_ONCE)
         self._for = certified.running_in(gait)
         self.take_over_parameters()
@@ -159,7 +159,8 @@ class Promises:
     def take_over_parameters(self) -> None:
         """Predict with the blocks as they run now."""
         certified = self._certified
-        self._supervisor, self._reference = certified.supervisor(), certified.reference()
+        self._supervisor = certified.supervisor(self._lead_ns)
+        self._reference = certified.reference()
         self._running_gait = certified.running_gait()
         self._tick_ns = self._node.parameters_of(TickParameters).tick_ns
 
@@ -199,12 +200,11 @@ class Promises:
         self.latest = bounded
         self._slices.begin(looking_ahead(
             self._supervisor, self._reference, self._running_gait, state, now.announced,
-            now.canonical, now.r, now.command, tick_s, body_mode=now.barring,
-            lead_ns=now.lead_ns), predicted)
+            now.canonical, now.r, now.command, tick_s, body_mode=now.barring), predicted)
 
     def _bounded(self, gait: GaitInForce, now: Present) -> Promise:
         """What is certain of a request that acts in a gait, from now on."""
-        state, lead_s = now.state, 1e-9 * now.lead_ns
+        state, lead_s = now.state, 1e-9 * self._supervisor.lead_ns
         self._for = running = self._certified.running_in(gait)
         self.due_ns, way = inf, nan
         if not state.requested:
@@ -213,7 +213,7 @@ class Promises:
             way = running.stop_distance(now.r, now.command, lead_s)
             bound = self._bound_by_votes(now) if state.voted else running.time_to_rest(
                 now.slow, now.canonical.x, now.r, state.quickness)
-            bound += 2.0 * lead_s  # of the request, and of arming
+            bound += running.time_ahead(lead_s)
             if isfinite(bound):
                 self.due_ns = state.time_ns + 1e9 * bound
         return Promise(state.measured_s, bound, way)

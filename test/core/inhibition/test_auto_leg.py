@@ -13,7 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.canonical.inhibition import AUTO, InhibitionParameters
+from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.inhibition.entry import half_arc, next_leg
 from dmp_cpg_ros.core.inhibition.handover import adopted
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.studies.oscillator_loop import Oscillators
@@ -164,3 +166,45 @@ def test_at_rest_auto_takes_over_and_hands_over_the_leg_that_holds() -> None:
 def test_auto_stands_alone() -> None:
     with pytest.raises(ParameterError, match=r'or be \[auto\]'):
         InhibitionParameters(inhibited_legs=('fl', AUTO))
+
+
+@pytest.mark.parametrize('gait', ['walk', 'amble', 'trot', 'bound'])
+@pytest.mark.parametrize('cadence', [1.0, 3.0])
+@pytest.mark.parametrize('lead', [0.05, 0.1, 0.15, 0.2])
+def test_the_leg_is_caught_that_comes_to_its_place_once_what_was_told_ahead_acts(
+        lead: float, cadence: float, gait: str) -> None:
+    """For leads that are longer than the oscillators need from one leg's place to the next, too,
+    where the one that comes first is always past it by then.
+    """
+    for wait, speed in ((0.0, 0.0), (0.1, 0.0), (0.8, 0.5)):
+        loop = Oscillators(ROBOT, {'gait': gait, 'tick_s': TICK, 'lead_s': lead, 'parameters': {
+            'auto_inhibit': False, 'inhibited_legs': (AUTO,), 'cadence_scale': cadence,
+            'inhibition_gain': 1200.0}})
+        walking(go(loop, 0.1), speed, wait)
+        predicted, bound, ticks = loop.request(True), loop.time_to_rest(), 0
+        while loop.stop.state != 'at_rest':
+            loop.advance()
+            ticks += 1
+            assert ticks * TICK <= bound
+        assert ticks * TICK == pytest.approx(predicted, abs=1e-9)
+
+
+@settings(max_examples=60)
+@given(fl=st.floats(-np.pi, np.pi), ahead=st.floats(0.01, 3.0), count=st.integers(1, 60))
+def test_the_leg_that_is_aimed_at_is_kept_until_it_has_been_at_its_place(
+        fl: float, ahead: float, count: int) -> None:
+    loop = oscillators('walk')
+    network, inhibition = loop.network, loop.parameters.inhibition
+    half, places = half_arc(inhibition.region_radius, 1.0), network.gait.phases
+
+    def aimed(turned: float, kept: int | None) -> int:
+        x = state_at(fl + turned - places)
+        return next_leg(network, inhibition, x, ahead, kept)[0]
+
+    leg = aimed(0.0, None)
+    way = (half - (fl - places[leg])) % (2.0 * np.pi)  # to where it is past its place
+    assert way >= min(ahead, 2.0 * np.pi - 0.01) - 1e-6
+    kept = leg
+    for turned in np.linspace(0.0, way - 1e-6, count):
+        kept = aimed(turned, kept)
+    assert kept == leg
