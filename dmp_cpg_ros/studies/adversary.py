@@ -41,11 +41,14 @@ WEAKENED = tuple(dict.fromkeys((*adversary_networks.WEAKENED, *CONDITIONS, *adve
 SHRINK_S = 10.0
 """How long a network that fails is made smaller [s]."""
 
+ALONE = ('suite', 'auto')
+"""What can be attacked alone: the suite in any setting, or with a leg chosen at each stop."""
+
 FOLLOWING = ('rest_in_region',)
 """Rows that follow from others, as doc/certificate.md proves, so that nothing can be left out."""
 
 
-def search(seed: int, seconds: float, weaken: str = '', most: int = 3, auto: bool = False
+def search(seed: int, seconds: float, weaken: str = '', most: int = 3, only: str = ''
            ) -> tuple[Counter[str], list[Case]]:
     """Attack until the time is over or enough was found.
 
@@ -59,8 +62,8 @@ def search(seed: int, seconds: float, weaken: str = '', most: int = 3, auto: boo
         What is left out; empty for an honest search.
     most : int
         Failures that are enough.
-    auto : bool
-        Whether to attack the suite only, with the leg chosen at each stop.
+    only : str
+        What alone is attacked, one of ``ALONE``; empty for all.
 
     Returns
     -------
@@ -77,12 +80,12 @@ def search(seed: int, seconds: float, weaken: str = '', most: int = 3, auto: boo
     close: list[tuple[float, Case]] = []
     counts, failures = Counter[str](), list[Case]()
     while time.monotonic() < end and len(failures) < most:
-        if weaken in ('', *adversary_networks.WEAKENED) and not auto:
+        if weaken in ('', *adversary_networks.WEAKENED) and not only:
             size = int(rng.choice(sizes, p=1.0 / sizes / np.sum(1.0 / sizes)))
             _, met = adversary_networks.attack(rng, size, 250, weaken, close, counts)
             failures += [_smallest(one, weaken) for one in met[:1]] + met[1:]
         rows = [weaken] if weaken in adversary_rows.ROWS else (
-            [] if weaken or auto else [str(rng.choice(list(adversary_rows.ROWS)))])
+            [] if weaken or only else [str(rng.choice(list(adversary_rows.ROWS)))])
         for row in rows:
             ran, met = adversary_rows.attack(rng, description, row, bool(weaken))
             counts['rows'] += ran
@@ -91,7 +94,7 @@ def search(seed: int, seconds: float, weaken: str = '', most: int = 3, auto: boo
             case = varied(rng, guided[rng.integers(len(guided))][1]) if (
                 guided and rng.random() < 0.5) else setting(rng, weaken)
             if not case['events']:
-                if auto:
+                if only == 'auto':
                     case['parameters']['inhibited_legs'] = (AUTO,)
                 if not _is_certified(description, case):
                     continue
@@ -130,7 +133,7 @@ def _smallest_suite(description: RobotDescription, case: Case, what: str, weaken
     return {'attack': 'suite', 'happened': play(description, case, weaken)[0], **case}
 
 
-def _searched(job: tuple[int, float, str, int, bool]) -> tuple[Counter[str], list[Case]]:
+def _searched(job: tuple[int, float, str, int, str]) -> tuple[Counter[str], list[Case]]:
     return search(*job)
 
 
@@ -146,14 +149,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--failures', type=int, default=3, help='stop after this many')
     parser.add_argument('--record', type=Path, help='Markdown file to add the counts to, that is '
                         'there')
-    parser.add_argument('--auto', action='store_true',
-                        help='attack the suite only, with inhibited_legs: [auto]')
+    parser.add_argument('--only', choices=ALONE, default='',
+                        help='attack the suite alone, in any setting or with a leg that is chosen')
     return run_command(parser, arguments, _attack)
 
 
 def _attack(options: argparse.Namespace, _: RosArguments) -> int:
     jobs = [(1000 * options.seed + k, options.seconds, options.weaken, options.failures,
-             options.auto)
+             options.only)
             for k in range(options.workers)]
     if options.record is not None:
         readable(options.record).read_text(encoding='utf-8')  # fails before minutes of search
@@ -180,7 +183,7 @@ def _row(total: Counter[str], options: argparse.Namespace, failures: int) -> str
     requests = sum(total[name] for name in ('stop', 'start', 'request', 'release', 'edge', 'box'))
     changes = sum(total[name] for name in ('set', 'gait', 'change', 'cadence'))
     return (f'| {options.seed} | {options.workers} x {options.seconds:g} s '
-            f'| {options.weaken or ("nothing, auto" if options.auto else "nothing")} '
+            f'| {", ".join(filter(None, (options.weaken or "nothing", options.only)))} '
             f'| {total["networks"]} ({total["settings"]}) '
             f'| {total["networks"] * adversary_networks.STARTS} | {total["suites"]} '
             f'| {requests} | {changes} ({total["accepted"]}) | {failures} |')
