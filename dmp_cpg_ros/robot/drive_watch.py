@@ -58,6 +58,11 @@ that to have power [ns].
 WELL_NS = 1_000_000_000
 """Time for which a joint must have done what it is told until it counts as sound again [ns]."""
 
+TRIED_NS = 100_000_000
+"""Time after its power is back for which a leg is cut off as soon as it gives what nobody asks for
+[ns]: a leg that gives anything throws a robot over that lies, too, before it is found to be wild.
+"""
+
 LONGEST_NS = 50_000_000
 """Longest time between two states that are judged together [ns]."""
 
@@ -108,6 +113,7 @@ class DriveWatch:
         self._means, self._news = np.zeros((2, 10, len(self._names)))
         self._strange_ns = np.full(len(LEGS), -STRANGE_NS)
         self._lame_ns = np.full(len(LEGS), -WELL_NS)
+        self._back_ns = np.full(len(LEGS), -TRIED_NS)  # when its power came back
         self.lame: tuple[str, ...] = ()
 
     def tell(self, time_ns: int, targets: JointTargets) -> None:
@@ -191,10 +197,16 @@ class DriveWatch:
         followed = (np.maximum(means[6:8], 0.0) ** 2 / np.maximum(means[5:3:-1], 1e-9)).max(axis=0)
         kicks = np.minimum(means[8] - mean * mean, means[8] - followed)
         wild = kicks.reshape(len(LEGS), -1).sum(axis=1) > WILD
+        tried = now - self._back_ns < TRIED_NS
+        wild |= tried & (strange > STRANGE * STRANGE)
         lame = (limp | (wild & self.cuts)) & self._reports
         if lame.any():
             self._lame_ns = np.where(lame, now, self._lame_ns)
         elif not self.lame:
             return
-        lately = now - self._lame_ns < WELL_NS
+        lately, before = now - self._lame_ns < WELL_NS, self.lame
         self.lame = tuple(leg for leg, of in zip(LEGS, lately, strict=True) if of)
+        if self.cuts:  # that it gave nothing while it was cut off is no sign against a leg
+            back = np.array([leg in before and leg not in self.lame for leg in LEGS])
+            self._back_ns = np.where(back, now, self._back_ns)
+            self._means[:, np.repeat(back, len(self._names) // len(LEGS))] = 0.0

@@ -82,6 +82,11 @@ TAKEN_UP_S = 0.3
 by which they are away [s].
 """
 
+YIELDS = 0.15
+"""Share of its torque limits with which a leg moves that was cut off, until the legs are followed
+again: it may lie under the body, which full torque would roll over.
+"""
+
 SLOWER = (('stand', 'stand'), ('lie', 'lie'))
 """What a robot does by itself, and the way of it, that gives way to lying down at once."""
 
@@ -152,6 +157,9 @@ class CommandWatchdog:
         self._begin_ns = self._late_ns = self._uneasy_ns = self._taken_ns = 0
         self._ease_ns, self._alone_ns = AT_EASE_NS, -AGAIN_NS
         self._taking_s, self._stop_s = TAKEN_UP_S, 0.0
+        self._cut: set[str] = set()  # legs that are or were cut off since it looks after itself
+        limit = np.concatenate([leg.torque_limit for leg in description.legs])
+        self._yields = YIELDS * limit / np.maximum(np.tile(description.kp, 4), 1e-9)  # [rad]
         self._lagged_ns = -1
         self.lateness_ns = self.ticks = self.carried = 0
         self._start = self._targets
@@ -214,10 +222,26 @@ class CommandWatchdog:
         """Targets of all joints, (12,) each, at a state of the robot."""
         self.drives.see(state)
         targets = self._chosen(state)
+        self._cut |= set(self.drives.lame) if self.drives.cuts else set()
+        if not self.fallback:
+            self._cut.clear()
+        elif self._cut:
+            targets = self._yielding(targets, state)
         self._given = targets.position.copy()
         self.leaving = self.fallback or self.leaving
         self.drives.tell(state.time_ns, targets)
         return targets
+
+    def _yielding(self, targets: JointTargets, state: RobotState) -> JointTargets:
+        """Targets by which a leg that is cut off has nothing to do, and goes on with little torque
+        from where it is once its power is back.
+        """
+        cut, lame = (np.repeat([leg in legs for leg in LEGS], len(JOINTS_OF_LEG))
+                     for legs in (self._cut, self.drives.lame))
+        most, q = np.where(lame, 0.0, self._yields), state.joint_position
+        return JointTargets(
+            np.where(cut, np.clip(targets.position, q - most, q + most), targets.position),
+            np.where(cut, 0.0, targets.velocity), np.where(cut, 0.0, targets.effort))
 
     def _chosen(self, state: RobotState) -> JointTargets:
         now, known = state.time_ns, None not in self.stamps

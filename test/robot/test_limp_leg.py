@@ -14,7 +14,7 @@ pytest.importorskip('mujoco')
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.fault import Fault
 from dmp_cpg_ros.robot.drive_watch import DriveWatch
-from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.robot.mujoco_robot import LYING_TILT, MujocoRobot
 from dmp_cpg_ros.studies.failures import FailingWalk, walking
 
 ROBOT = 'robots/mini_quadruped.yaml'
@@ -95,6 +95,53 @@ def test_a_weak_leg_and_a_push_are_walked_through_without_a_word(share: float) -
         assert not walk.watchdog.drives.failing and not walk.watchdog.fallback
 
 
+class CutOff:
+    """A watch of drives that are asked for torque, of which those of a leg gave none for a while,
+    were cut off, and have their power again.
+    """
+
+    def __init__(self, leg: str) -> None:
+        robot = MujocoRobot()
+        self._state, self._tick_ns, self._tick = robot.reset(), robot.tick_ns, 0
+        self.watch, self._kd = DriveWatch(robot.description), np.tile(robot.description.kd, 4)
+        self.watch.cuts = True
+        self._leg = np.repeat([of == leg for of in LEGS], 3)
+        self._asked = np.tile(robot.description.kp, 4) * 0.1
+        self._targets = JointTargets(self._state.joint_position + 0.1, *np.zeros((2, 12)))
+        assert not any(self.run(1.0, 0.0) for _ in range(300))
+        while not self.run(0.0, 1.0):
+            assert self._tick < 400
+        assert self.watch.lame == (leg,)
+        while self.run(0.0, 0.0):
+            assert self._tick < 800
+
+    def run(self, share: float, speed: float) -> bool:
+        """Whether a leg is lame after a tick in which the leg gave a share of what it was asked
+        for, and moved [rad/s].
+        """
+        self._tick += 1
+        moves = np.where(self._leg, speed, 0.0)
+        effort = (self._asked - self._kd * moves) * np.where(self._leg, share, 1.0)
+        self.watch.see(replace(self._state, time_ns=self._tick * self._tick_ns,
+                               joint_velocity=moves, joint_effort=effort))
+        self.watch.tell(self._tick * self._tick_ns, self._targets)
+        return bool(self.watch.lame)
+
+
+def test_a_leg_that_was_cut_off_is_judged_by_what_it_gives_once_its_power_is_back() -> None:
+    for speed in (0.0, 1.0, 2.0):
+        cut_off = CutOff('fl')
+        assert not any(cut_off.run(1.0, speed) for _ in range(400))
+
+
+def test_a_leg_that_gives_what_nobody_asks_for_once_its_power_is_back_is_cut_off_at_once() -> None:
+    for share in (-1.0, 4.0):
+        cut_off = CutOff('rr')
+        assert any(cut_off.run(share, 0.0) for _ in range(3))
+    still_limp = CutOff('fl')
+    assert any(still_limp.run(0.0, 1.0) for _ in range(20))
+
+
 def test_drives_that_never_reported_a_torque_are_not_judged() -> None:
     robot = MujocoRobot()
     state, still = robot.reset(), np.zeros(12)
@@ -107,6 +154,24 @@ def test_drives_that_never_reported_a_torque_are_not_judged() -> None:
             watch.see(replace(state, time_ns=tick * robot.tick_ns, joint_effort=effort))
             watch.tell(tick * robot.tick_ns, targets)
         assert len(watch.failing) == (12 if reports else 0)
+
+
+@pytest.mark.parametrize(('leg', 'later_s', 'seed', 'requests'), [
+    ('fl', 0.0, 0, (('recover', 12.0),)),                    # its leg is under the body
+    ('rl', 0.3, 3, (('stand_up', 4.0),))])
+def test_a_robot_whose_leg_kicked_lies_and_stands_up_again(
+        leg: str, later_s: float, seed: int, requests: tuple[tuple[str, float], ...]) -> None:
+    walk = copied('trot', 0.5, later_s)
+    walk.injector.seed(seed)
+    walk.injector.add(Fault('joint', 'garbage', 0.5, leg), walk.state.time_ns)
+    assert not walk.follow(0.5, 2.0)
+    walk.loop.request(True)
+    walk.run(1.0)
+    assert walk.tilt < LYING_TILT and not walk.watchdog.drives.lame
+    for request, seconds in requests:
+        walk.loop.request_mode(request)
+        walk.run(seconds)
+    assert walk.loop.mode.mode == 'standing' and not walk.robot.fallen
 
 
 @pytest.mark.parametrize('cuts', [True, False])

@@ -5,7 +5,8 @@
 - ``standing``: the gait may run.
 - ``stopping``: it is to lie down; the gait is inhibited, and lying down begins once it rests.
 - ``lowering``, ``rising``: movements to ``lying`` and back to ``standing``.
-- ``damped``: it fell; the joints are held by damping alone until somebody asks for ``recover``.
+- ``damped``: it fell, or lies too tilted to rise; the joints are held by damping alone until
+  somebody asks for ``recover``.
 - ``recovering``: it rolls onto its belly, as often as it takes, and then rises.
 """
 
@@ -223,6 +224,9 @@ class ModeManager:
                 condition.height < RISEN_HEIGHT * self._stance_height):
             return _enter_now(state, 'lowering', 'the drives lower the robot by themselves; see '
                               'who moves the joints', ('fold',))
+        if state.mode == 'lying' and condition.tilt > UPRIGHT_TILT:
+            return _enter_now(state, 'damped', f'lay tilted by {condition.tilt:.2f} rad at '
+                              f'{time_ns * 1e-9:.3f} s, from where it cannot stand up')
         if state.mode == 'stopping':
             return self._stopped(state, at_rest)
         if state.movements and self._elapsed(state) >= self._time_of(state.movements[0]):

@@ -62,6 +62,18 @@ class Machine:
         return answer.accepted, answer.text
 
 
+@pytest.mark.parametrize('mode', ['standing', 'lying', 'damped'])
+@pytest.mark.parametrize('tilt', [0.0, 0.45, 0.55, 0.9, 1.5])
+def test_whatever_lies_gets_up_by_one_of_the_services(mode: str, tilt: float) -> None:
+    down = BodyCondition(np.array((0.0, math.sin(tilt), -math.cos(tilt))), tilt, 0.05, 0.0)
+    machine = Machine(mode)
+    if mode == 'standing':
+        machine.go(0.1).ask('lie_down')
+    machine.go(20.0, down)
+    assert machine.state.mode == ('lying' if tilt < 0.5 and mode != 'damped' else 'damped')
+    assert machine.ask('stand_up')[0] or machine.ask('recover')[0]
+
+
 @pytest.mark.parametrize('command', [
     *(BodyCommand(mode) for mode in MODES if mode not in MOVING),
     *(BodyCommand(mode, name, x, -x) for mode in MOVING for name in ('rise', 'push_left')
