@@ -25,6 +25,11 @@ class ProcessGroup:
         Folder for one file of output per process.
     server : ForkServer
         What starts them.
+
+    Attributes
+    ----------
+    failed : list of str
+        How those ended that did not end well when they were told to.
     """
 
     def __init__(self, logs: Path, server: ForkServer) -> None:
@@ -34,6 +39,7 @@ class ProcessGroup:
         self._processes: dict[str, Forked] = {}
         self._commands: dict[str, Sequence[str]] = {}
         self._ends: dict[str, str] = {}
+        self.failed: list[str] = []
 
     def start(self, name: str, command: Sequence[str], *, logged: bool = True) -> None:
         """Run an executable of this package with arguments, as :meth:`.ForkServer.start`. What is
@@ -101,4 +107,7 @@ class ProcessGroup:
                 killed.append(name)
                 process.kill()
                 process.wait()
+        ends = self.ended()
+        self.failed = [ends[name] for name, process in running.items()
+                       if name not in killed and process.poll()]
         return killed

@@ -113,6 +113,8 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
         finally:
             killed = views.stop(ENDED_WITHIN_S) + group.stop(ENDED_WITHIN_S)
             rclpy.try_shutdown()
+            for text in group.failed:
+                say(math.nan, text)
             if killed:
                 say(math.nan, f'had to kill {", ".join(killed)}')
         if killed:

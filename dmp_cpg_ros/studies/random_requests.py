@@ -39,7 +39,7 @@ from dmp_cpg_ros.studies.request_draws import drawn
 from dmp_cpg_ros.studies.request_player import ASKED
 from dmp_cpg_ros.studies.request_walks import Walked, walk
 
-LOOKED_AT = ('stops', 'starts', 'rests', 'walks')
+LOOKED_AT = ('stops', 'starts', 'risen or lain', 'rests', 'walks')
 """What is counted in the table."""
 
 

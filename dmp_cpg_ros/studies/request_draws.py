@@ -18,7 +18,7 @@ from dmp_cpg_ros.core.scenario.fault import COMPONENTS, KINDS, PLACED
 from dmp_cpg_ros.core.suite_parameters import CANONICAL, INHIBITION, OWNER
 from dmp_cpg_ros.studies.draws import Case, log_uniform
 from dmp_cpg_ros.studies.random_commands import GAITS, NUMBERS, WORDS, setting
-from dmp_cpg_ros.suite_table import POSTURE, ROBOT, WALKING_NODES
+from dmp_cpg_ros.suite_table import POSTURE, RECORDER, ROBOT, WALKING_NODES
 
 EVERY, SAME_TICK, MOST = (0.08, 1.6), 0.15, 25.0
 """Time between two events [s], share of those that come within the tick of the one before, and
@@ -30,6 +30,11 @@ QUIET, QUIET_S = 0.5, 1.5
 
 WALKS_S, RESTS_S, STANDS_S, RECOVERS_S = 3.0, 5.0, 4.0, 16.0
 """How long a robot is given at the end to walk, to rest, to stand up, and to recover [s]."""
+
+REST, SHUT_DOWN, INTERRUPT = ENDS = ('inhibit', 'shut_down', 'interrupt')
+"""How a sequence ends: at rest, or while the robot walks: by the transition ``shutdown`` of every
+node, in an order that is drawn, or by Ctrl-C.
+"""
 
 FAILS = (0.02, 0.3)
 """How long a component fails [s]."""
@@ -65,27 +70,38 @@ def drawn(seed: int, robot: str, mass: float) -> Case:
         'start_pose': str(rng.choice(['standing', 'lying'], p=(0.8, 0.2))),
         'control_rate': float(rng.choice([125.0, 250.0])),
         'stamped_cmd_vel': bool(rng.random() < 0.3), 'voting': bool(rng.random() < 0.3),
-        'events': events}
+        'events': events, 'end': _end(rng)}
 
 
 def ending(case: Case) -> list[list[Any]]:
-    """Events by which a robot is brought to walk and to rest again, whatever was before."""
+    """Events by which a robot is brought to walk, whatever was before, and to its end."""
     at = max([event[0] for event in case['events']], default=0.0) + 0.5
     end, failed = [], may_lie(case)
     for wait, kind, value in (
             (0.0, 'votes', {}), (1.0, 'command', 'silence'), (STANDS_S, 'stand_up', True),
             *([(RECOVERS_S, 'recover', True), (STANDS_S, 'stand_up', True)] if failed else ()),
             (0.0, 'command', {'v_x': 0.2}), (WALKS_S, 'inhibit', False),
-            (RESTS_S, 'inhibit', True)):
+            (RESTS_S, *case['end'])):
         end.append([round(at, 3), kind, value])
         at += wait
     return [*end, [round(at, 3), 'command', 'silence']]
+
+
+def ends_at_rest(case: Case) -> bool:
+    """Whether the robot is brought to rest before the nodes end."""
+    return bool(case['end'][0] == REST)
 
 
 def may_lie(case: Case) -> bool:
     """Whether something fails of which doc/faults.md says that the robot may lie down or fall."""
     return any(kind == 'fail' and value['component'] == 'joint'
                for _, kind, value in case['events'])
+
+
+def _end(rng: np.random.Generator) -> list[Any]:
+    kind = str(rng.choice(ENDS, p=(0.5, 0.25, 0.25)))
+    order = [str(name) for name in rng.permutation([*WALKING_NODES, RECORDER])]
+    return [kind, order if kind == SHUT_DOWN else True]
 
 
 def _before(rng: np.random.Generator) -> Iterator[tuple[float, str, Any]]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -26,7 +27,7 @@ from dmp_cpg_ros.nodes.framework.requests import ask
 from dmp_cpg_ros.nodes.messages.commands import twist
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.scenario_player import PlayerError, ScenarioPlayer
-from dmp_cpg_ros.suite_table import ROBOT, WALKING_NODES
+from dmp_cpg_ros.suite_table import RECORDER, ROBOT, WALKING_NODES
 
 ANSWERED_S, LOOK_S = 60.0, 0.02
 """How long an answer may take, and how often it is looked whether a node is ready again [s]."""
@@ -78,6 +79,10 @@ class RequestPlayer(ScenarioPlayer):
         requests as lists of kind and value; it ends active.
     ``at_once``
         Requests as lists of kind and value that are sent before the first is answered.
+    ``shut_down``
+        Nodes, which are asked in turn to shut down; the scenario ends with that.
+    ``interrupt``
+        The run is interrupted, as by Ctrl-C.
 
     Parameters
     ----------
@@ -90,7 +95,7 @@ class RequestPlayer(ScenarioPlayer):
         super().__init__(*arguments, **options)
         self._answers, self._asked_s = answers, time.monotonic()
         self._changers = {name: self.create_client(ChangeState, f'{name}/change_state')
-                          for name in WALKING_NODES}
+                          for name in (*WALKING_NODES, RECORDER)}
         self._parameters: dict[tuple[str, bool], Any] = {
             (name, whole): self.create_client(kind, f'{name}/{service}')
             for name in WALKING_NODES for whole, kind, service in (
@@ -104,7 +109,9 @@ class RequestPlayer(ScenarioPlayer):
             'parameters': self._raw, 'transition': self._transition, 'fail': self._let_fail}
         self._deliver |= {
             **{kind: partial(self._asked, kind) for kind in self._asking},
-            'twist': self._twist, 'cycle': self._cycle, 'at_once': self._at_once}
+            'twist': self._twist, 'cycle': self._cycle, 'at_once': self._at_once,
+            'shut_down': self._shut_down,
+            'interrupt': lambda _: signal.raise_signal(signal.SIGINT)}
         self.create_timer(1.0, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._back_timer = self.create_timer(
             LOOK_S, self._look_after_return, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -248,6 +255,21 @@ class RequestPlayer(ScenarioPlayer):
                 then()
 
         go_on(steps)
+
+    def _shut_down(self, nodes: Sequence[str]) -> None:
+        """Shut nodes down in turn, whatever those that are left make of it."""
+        if not nodes:
+            self.finished.set_result(None)
+            return
+
+        def answered(future: Future) -> None:
+            if not future.result().success:
+                self._note('shut_down', nodes[0], False, 'the transition failed')
+            self._shut_down(nodes[1:])
+
+        request = ChangeState.Request(transition=Transition(
+            id=Transition.TRANSITION_ACTIVE_SHUTDOWN))
+        self._changers[nodes[0]].call_async(request).add_done_callback(answered)
 
     def _look_after_return(self) -> None:
         """Go on once a node that was taken through its states is connected again."""

@@ -22,6 +22,7 @@ from dmp_cpg_ros.analysis.bag import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import held, spans, tilt
 from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.commands.ending_signals import InterruptedRunError
 from dmp_cpg_ros.commands.fork_server import ForkServer
 from dmp_cpg_ros.commands.run_folder import resolved_parameters, write_parameters
 from dmp_cpg_ros.commands.suite_run import run_suite
@@ -29,12 +30,20 @@ from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.modes.falls import FALLEN_HEIGHT_SHARE, FALLEN_TILT
+from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS, Event, Scenario
 from dmp_cpg_ros.core.suite_parameters import REFERENCE
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.studies.draws import Case
-from dmp_cpg_ros.studies.request_draws import RESTS_S, WALKS_S, ending, may_lie
+from dmp_cpg_ros.studies.request_draws import (
+    INTERRUPT,
+    RESTS_S,
+    WALKS_S,
+    ending,
+    ends_at_rest,
+    may_lie,
+)
 from dmp_cpg_ros.studies.request_player import Answer, RequestPlayer
 from dmp_cpg_ros.suite import load_suite
 from dmp_cpg_ros.suite_table import RECORDED_WALK, RECORDER, WALKING
@@ -58,6 +67,7 @@ MARGIN = 1e-6
 
 REST = re.compile(r'at rest in ([\d.]+) s(?:, at most ([\d.]+) s)?')
 WALK = re.compile(r'walking in ([\d.]+) s(?:, at most ([\d.]+) s)?')
+MODE = re.compile(r'(standing|lying) in ([\d.]+) s')
 
 
 @dataclass
@@ -116,8 +126,12 @@ def walk(case: Case, folder: Path) -> Walked:
                       lock_step=True, processes='composed',
                       stamped=resolved[REFERENCE]['stamped_cmd_vel'],
                       make_player=partial(RequestPlayer, walked.answers))
+    except InterruptedRunError as error:
+        if case['end'][0] != INTERRUPT:
+            walked.wrong.append(f'ended: {error}')
     except DmpCpgError as error:
         walked.wrong.append(f'ended: {error}')
+    walked.wrong += [f'ended: {text}' for text in said if ' ended with status ' in text]
     (folder / 'said.txt').write_text('\n'.join(said), encoding='utf-8')
     walked.wrong += _in_logs(folder / 'logs')
     try:
@@ -184,6 +198,7 @@ class Judge:
         if not may_lie(self._case):
             yield from self._fall()
         yield from self._promises()
+        yield from self._modes_in_time()
         yield from self._motion()
         yield from self._usable()
 
@@ -253,15 +268,10 @@ class Judge:
             stop, at = answer.value, answer.time_ns * 1e-9 - self._tick_s
             words = ('at_rest',) if stop else ('walking', 'free')
             found = (REST if stop else WALK).search(answer.text)
-            later = min([of.time_ns * 1e-9 for of in answers[place + 1:] if of.accepted]
-                        + [change for change in self._changes if change > at + self._tick_s],
-                        default=inf)
             if found is None:
                 continue
             predicted, bound = float(found[1]), float(found[2] or inf)
-            fails = any(begin < at + predicted and at < end + PUSHED_S
-                        for begin, end in self._failing)
-            if fails or min(later, self._end) <= at + max(predicted, self._tick_s) + self._tick_s:
+            if not self._undisturbed(place, predicted):
                 continue
             self._checked['stops' if stop else 'starts'] += 1
             done = next((time for time, word in self._states
@@ -276,6 +286,33 @@ class Judge:
             elif abs(done - at - predicted) > 0.5 * self._tick_s + 1e-3:
                 yield (f'{"stop" if stop else "start"} at {at:.3f} s took {done - at:.3f} s, '
                        f'predicted {predicted:.3f} s')
+
+    def _modes_in_time(self) -> Iterator[str]:
+        """Standing up and lying down in the time that was said, in the same way."""
+        for place, answer in enumerate(self._walked.answers):
+            found = MODE.search(answer.text) if answer.kind in REQUESTS else None
+            if found is None or not answer.accepted:
+                continue
+            word, predicted, at = found[1], float(found[2]), answer.time_ns * 1e-9 - self._tick_s
+            if not self._undisturbed(place, predicted + 0.01):
+                continue
+            self._checked['risen or lain'] += 1
+            done = next((time for time, mode in self._modes if mode == word and time > at), inf)
+            if abs(done - at - predicted) > 0.01 + 2.0 * self._tick_s:
+                yield (f'{answer.kind} at {at:.3f} s took {done - at:.3f} s, predicted '
+                       f'{predicted:.2f} s')
+
+    def _undisturbed(self, place: int, predicted: float) -> bool:
+        """Whether nothing came between an answer and what it predicts in a time [s]."""
+        answers, at = self._walked.answers, self._walked.answers[place].time_ns * 1e-9
+        at -= self._tick_s
+        later = min([of.time_ns * 1e-9 for of in answers[place + 1:] if of.accepted]
+                    + [change for change in self._changes if change > at + self._tick_s],
+                    default=inf)
+        fails = any(begin < at + predicted and at < end + PUSHED_S
+                    for begin, end in self._failing)
+        return not fails and (
+            min(later, self._end) > at + max(predicted, self._tick_s) + self._tick_s)
 
     def _motion(self) -> Iterator[str]:
         """Whether what is said to rest rests, and what is said to walk walks."""
@@ -304,14 +341,15 @@ class Judge:
                     yield f'walks from {begin:.3f} s on, and its oscillators stand still'
 
     def _usable(self) -> Iterator[str]:
-        """Whether the robot could be brought to walk and to rest at the end."""
+        """Whether the robot could be brought to walk at the end, and to rest where it was to."""
         if self._walked.wrong:
             return
-        stop_s = self._end - RESTS_S
+        rests = ends_at_rest(self._case)
+        stop_s = self._end - RESTS_S if rests else self._end
         walks = [word for time, word in self._states if time < stop_s]
         if walks[-1:] not in (['walking'], ['free']):
             yield f'does not walk at the end: {walks[-1:]}, {self._modes[-1:]}'
-        elif self._states[-1][1] != 'at_rest' and self._rests_by() <= self._end:
+        elif rests and self._states[-1][1] != 'at_rest' and self._rests_by() <= self._end:
             yield f'does not rest at the end: {self._states[-1]}'
         time = self._recording.odometry.time
         inside = (time > stop_s - 0.5 * WALKS_S) & (time < stop_s)

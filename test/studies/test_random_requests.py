@@ -32,13 +32,15 @@ from dmp_cpg_ros.studies.draws import smallest
 from dmp_cpg_ros.studies.request_draws import drawn, may_lie
 from dmp_cpg_ros.studies.request_player import ASKED, Answer
 from dmp_cpg_ros.studies.request_walks import Judge, Walked, scenario_of
+from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
 
 ros_domain = ros_processes.ros_domain
 
 TICK_S, STOP_S, REST_S = 0.004, 8.0, 9.0
 
 KINDS = {'command', 'twist', 'inhibit', 'stand_up', 'lie_down', 'recover', 'set', 'gait',
-         'parameters', 'cycle', 'transition', 'push', 'fail', 'at_once', 'votes'}
+         'parameters', 'cycle', 'transition', 'push', 'fail', 'at_once', 'votes', 'shut_down',
+         'interrupt'}
 
 
 def test_all_kinds_are_drawn_and_the_same_seed_draws_the_same() -> None:
@@ -77,7 +79,7 @@ def walked(**changed: Any) -> tuple[Recording, Walked]:
     return replace(recording, **changed), Walked(answers=answers)
 
 
-CASE = {'events': [[8.0, 'inhibit', True]]}
+CASE = {'events': [[8.0, 'inhibit', True]], 'end': ['inhibit', True]}
 
 
 def wrong(case: Any = None, recording: Recording | None = None, said: Walked | None = None
@@ -99,6 +101,20 @@ def test_nothing_is_wrong_with_a_walk_that_keeps_what_was_said() -> None:
 def test_a_stop_at_another_time_than_was_said_is_found(text: str, found: str) -> None:
     said = Walked(answers=[Answer(round(STOP_S * 1e9), 'inhibit', True, True, text)])
     assert any(found in each for each in wrong(said=said))
+
+
+@pytest.mark.parametrize(('took', 'events'), [(1.0, ()), (1.5, ()), (1.5, (6.7,))])
+def test_a_robot_that_rises_in_another_time_than_was_said_is_found(
+        took: float, events: tuple[float, ...]) -> None:
+    recording, said = walked()
+    modes = tuple(StatusEvent(at, 0, word, {}) for at, word in (
+        (0.0, 'standing'), (5.0, 'lying'), (6.5, 'rising'), (6.5 - TICK_S + took, 'standing')))
+    said.answers.insert(0, Answer(round(6.5e9), 'stand_up', True, True,
+                                  'rising, standing in 1.00 s'))
+    said.answers[1:1] = [Answer(round(at * 1e9), 'set', {}, True, '') for at in events]
+    late = [text for text in wrong(recording=replace(recording, modes=modes), said=said)
+            if 'stand_up' in text]
+    assert len(late) == (took > 1.0 and not events)
 
 
 def test_what_is_accepted_after_a_stop_excuses_it() -> None:
@@ -137,7 +153,8 @@ def test_falls_motion_and_numbers_are_found() -> None:
 
 
 def test_a_robot_whose_joints_fail_may_lie() -> None:
-    case = {'events': [[1.0, 'fail', {'component': 'joint', 'kind': 'off', 'for_s': 0.1}]]}
+    case = {**CASE, 'events': [[1.0, 'fail', {'component': 'joint', 'kind': 'off',
+                                              'for_s': 0.1}]]}
     recording, _ = walked()
     modes = (*recording.modes, StatusEvent(2.0, 0, 'damped', {}))
     assert may_lie(case) and not may_lie(CASE)
@@ -170,7 +187,9 @@ def test_real_nodes_are_asked_and_answer(ros_domain: int, tmp_path: Path,
         [0.8, 'transition', ['mujoco_robot', 99]]]
     case = {'seed': 1, 'robot': 'robots/mini_quadruped.yaml', 'gait': 'amble',
             'start_pose': 'standing', 'control_rate': ros_processes.SHARED_HZ,
-            'stamped_cmd_vel': True, 'voting': False, 'events': events}
+            'stamped_cmd_vel': True, 'voting': False, 'events': events,
+            'end': ['shut_down', [WALKING_NODES[-2], RECORDER, *WALKING_NODES[:-2],
+                                  WALKING_NODES[-1]]]}
     result = random_requests._walked(case, tmp_path)
     assert result.wrong == []
     answered = {(answer.kind, answer.accepted) for answer in result.answers}
