@@ -9,7 +9,8 @@ reports, over the last few hundredths of a second, ∫ τ τ* < 0.15 ∫ τ*² w
 is limp whose three joints move and give nothing; one that has given what nobody asked for has
 power, and carries. One is wild whose torques vary by much that has nothing to do with τ*: the
 smaller of their variance and ∫ τ² − (∫ τ τ*)² / ∫ τ*². Limp or wild, a leg is lame: the robot lies
-down, and cuts the leg off where it can.
+down, and cuts the leg off where it can. Once its power is back what it gave before does not count,
+and what it gives without being asked at first cuts it off again.
 
 Motors behind a bus act by commands of some periods ago, nobody knows how many. Of them τ* is what
 is nearest to τ between all that the targets of that time have asked for.
@@ -24,7 +25,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets, RobotState
 from dmp_cpg_ros.robot.joint_drive import JointDrive
 
 MEMORY_S = 0.02
@@ -85,7 +86,8 @@ class DriveWatch:
     late_ns : int
         Age of the oldest targets by which drives may still act [ns]; 0 where they act by the last.
     failing : tuple of str
-        Joints, by the robot's names, that do not follow or did not lately.
+        Joints, by the robot's names, that do not follow or did not lately; those of a leg that is
+        cut off among them.
     cuts : bool
         Whether lame legs are without power: drives that give anything are to be cut off, and a
         robot that only lies down with one of them is thrown over from its belly.
@@ -152,6 +154,8 @@ class DriveWatch:
             self._reports = bool((much & (shared > WORKS * power)).any())
             return
         failing = (much & (shared < FOLLOWS * power)).all(axis=0)
+        if self.cuts and self.lame:
+            failing |= np.repeat([leg in self.lame for leg in LEGS], len(JOINTS_OF_LEG))
         if failing.any():
             self._failed_ns = np.where(failing, now, self._failed_ns)
         elif not self.failing:
@@ -209,4 +213,4 @@ class DriveWatch:
         if self.cuts:  # that it gave nothing while it was cut off is no sign against a leg
             back = np.array([leg in before and leg not in self.lame for leg in LEGS])
             self._back_ns = np.where(back, now, self._back_ns)
-            self._means[:, np.repeat(back, len(self._names) // len(LEGS))] = 0.0
+            self._means[:, np.repeat(back, len(JOINTS_OF_LEG))] = 0.0

@@ -355,7 +355,7 @@ class Judge:
         inside = (time > stop_s - 0.5 * WALKS_S) & (time < stop_s)
         pace: Array = self._recording.odometry.velocity_in_base[inside, 0]
         wanted = held(self._recording.reference.time, self._recording.reference.value,
-                      np.array([stop_s]))[0, 0]
+                      time[inside])[:, 0].mean() if len(pace) else 0.0
         if len(pace) and pace.mean() < 0.5 * wanted:
             yield f'walks at {pace.mean():.3f} m/s at the end, asked for {wanted:.3f} m/s'
 

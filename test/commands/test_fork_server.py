@@ -151,3 +151,28 @@ def test_the_end_of_a_process_is_read_from_its_log_once(
     assert ends['node'].startswith('node ended with status ') and 'nose' in ends['node']
     (tmp_path / 'node.log').write_text('another end')
     assert group.ended() == ends
+
+
+class Interrupted:
+    """A process that ends with a status once it is interrupted."""
+
+    def __init__(self, status: int) -> None:
+        self._status, self._ended = status, False
+
+    def send_signal(self, number: int) -> None:
+        self._ended = number == signal.SIGINT
+
+    def poll(self) -> int | None:
+        return self._status if self._ended else None
+
+    def wait(self, timeout: float) -> int:
+        return self._status
+
+
+def test_who_does_not_end_well_when_told_to_is_named(server: ForkServer, tmp_path: Path) -> None:
+    group = ProcessGroup(tmp_path, server)
+    for name, status in (('well', 0), ('badly', 1)):
+        group._processes[name] = Interrupted(status)
+        (tmp_path / f'{name}.log').write_text('last words')
+    assert group.stop(1.0) == []
+    assert group.failed == ['badly ended with status 1: last words']

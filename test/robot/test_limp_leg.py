@@ -183,6 +183,9 @@ def test_a_leg_that_kicks_is_lame_at_once_where_it_can_be_cut_off(cuts: bool) ->
     assert walk.watchdog.drives.lame == (('fr',) if cuts else ())
     assert {name[:2] for name in walk.watchdog.drives.failing} == {'fr'}
     assert walk.robot.without_power == walk.watchdog.drives.lame
+    walk.run(0.5)
+    named = walk.watchdog.drives.failing                     # as long as it is cut off, at least
+    assert set(named) >= ({f'fr_{joint}' for joint in JOINTS_OF_LEG} if cuts else set())
 
 
 def test_a_leg_without_power_gives_no_torque_whatever_it_is_told() -> None:
