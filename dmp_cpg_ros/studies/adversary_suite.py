@@ -237,7 +237,8 @@ def setting(rng: np.random.Generator, weaken: str = '') -> Case:
         parameters['silence_weight'] = 0.0   # silent sensors vote after what is predicted
     return {'gait': str(rng.choice(list(GAITS))), 'parameters': parameters,
             'tick_s': float(rng.choice([0.001, 0.002, 0.004, 0.004, 0.01])), 'events': [],
-            'lead_s': float(rng.choice([0.0, 0.024, log_uniform(rng, 0.002, 0.2)]))}
+            'lead_s': float(rng.choice([0.0, 0.024, log_uniform(rng, 0.002, 0.2),
+                                        rng.uniform(0.05, 0.2)]))}
 
 
 def random_events(rng: np.random.Generator, voting: bool, weaken: str = '') -> list[list[Any]]:
