@@ -143,7 +143,7 @@ def pushed(manoeuvre: str, speed_change: float, case: int, cases: int, drawn: bo
         run.walk(case / cases * run.period())
     then(run.loop)
     run.walk(draw.uniform(0.0, window))
-    _push(run, speed_change, angle, duration)
+    push(run, speed_change, angle, duration)
     releases, reference = 0, 0.0
     for _ in range(ceil((RECOVERY + duration) / run.tick_s)):
         was = run.loop.stop.push.acts
@@ -171,12 +171,14 @@ def caught(gait: str, speed: float, speed_change: float, case: int, quick: bool 
     run, angle = deepcopy(_steady(gait, speed, robot, ground, quick)), draw.uniform(0.0, 2.0 * pi)
     duration = round(draw.uniform(*PUSH_DURATIONS), 3)
     run.walk(draw.uniform(0.0, run.period()))
-    _push(run, speed_change, angle, duration)
+    push(run, speed_change, angle, duration)
     return run.walk(RECOVERY + duration)
 
 
-def _push(run: Walk, speed_change: float, angle: float, duration: float) -> None:
-    """Push in a direction of the base frame [rad] for a time [s]."""
+def push(run: Walk, speed_change: float, angle: float, duration: float) -> None:
+    """Push a robot from now on so that its free body's speed would change by so much [m/s], in a
+    direction of the base frame [rad], for a time [s].
+    """
     yaw = angle + float(attitude([run.state])[0, 2])
     force = run.robot.description.mass * speed_change / duration
     run.robot.apply_push(force * np.array((cos(yaw), sin(yaw), 0.0)), round(duration * 1e9))

@@ -4,6 +4,9 @@
 gaits that change every 2 to 8 s, stops every 4 to 14 s that are held for 0.2 to 4.5 s. With
 ``--changes`` also one of the parameters that may change while they run every 0.3 to 3 s, anywhere
 in its range or in what certificates can be had for, and lying down or standing up every 5 to 20 s.
+With ``--auto-gait`` the gait is chosen by speed, among gaits and at speeds that change every 5 to
+20 s; with ``--disturbed`` each walk is disturbed by some of a slippery floor, hills and bumps, a
+payload, and pushes (:mod:`~dmp_cpg_ros.studies.disturbances`).
 
 Prints the falls with what was asked when, the stops that took longer than their bound or another
 time than predicted, and the share of what was asked that was granted. Of stops in which parameters
@@ -30,7 +33,10 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.studies import output
+from dmp_cpg_ros.studies.disturbances import UNDISTURBED, Disturbance, pushes
+from dmp_cpg_ros.studies.draws import log_uniform
 from dmp_cpg_ros.studies.loop_recording import Velocity, suite_of
+from dmp_cpg_ros.studies.push_trials import push
 from dmp_cpg_ros.studies.walking_trials import Walk
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_gaits
@@ -38,8 +44,10 @@ from dmp_cpg_ros.suite import load_gaits
 JUMPS, CHANGES, STOPS, HOLDS = (0.5, 3.0), (2.0, 8.0), (4.0, 14.0), (0.2, 4.5)
 """Times between jumps of the command, changes of the gait and stops, and of holding one [s]."""
 
-SETTINGS, MODES = (0.3, 3.0), (5.0, 20.0)
-"""Times between changes of a parameter, and between requests to lie down or stand up [s]."""
+SETTINGS, MODES, CHOICES = (0.3, 3.0), (5.0, 20.0), (5.0, 20.0)
+"""Times between changes of a parameter, between requests to lie down or stand up, and between
+changes of what ``auto_gait`` chooses among [s].
+"""
 
 GAITS = ('amble', 'walk', 'trot', 'pace', 'bound', 'pronk')
 
@@ -50,6 +58,9 @@ NUMBERS = {
     'braking': (0.5, 6.0), 'inhibition_gain': (100.0, 4000.0), 'region_radius': (0.05, 0.6),
     'capture_speed': (0.01, 10.0), 'auto_delay': (0.05, 5.0)}
 """Numbers that change, and between what they are drawn, evenly over their logarithms."""
+
+BAND, APART = (0.001, 0.2), (0.02, 0.5)
+"""Of ``auto_gait``: width of the bands, and distances between them, dimensionless speeds."""
 
 NEAR_THE_GROUND = ('lowering', 'lying', 'rising')
 """Modes of a body that has not fallen and may touch the ground."""
@@ -86,6 +97,10 @@ class Outcome:
     touched : float
         Time at whose ticks parts of the robot touched one another, as legs that kick each other
         [s].
+    disturbed : dict of str to float
+        By what, but for pushes.
+    pushed : int
+        Pushes.
     """
 
     seed: int
@@ -98,6 +113,8 @@ class Outcome:
     changed: int = 0
     refused: int = 0
     touched: float = 0.0
+    disturbed: dict[str, float] = field(default_factory=dict)
+    pushed: int = 0
 
     @property
     def late(self) -> list[tuple[str, float, float, float]]:
@@ -107,11 +124,12 @@ class Outcome:
 
 
 def course(seed: int, seconds: float, limits: Velocity, gaits: Sequence[str] = GAITS,
-           changes_too: bool = False) -> list[tuple[float, str, Any]]:
-    """Events of one walk in order of time: ``command``, ``gait``, ``stop`` (whether), and with
-    changes ``set`` (a mapping) and ``mode``; those of a longer one begin with them.
+           changes_too: bool = False, auto_gait: bool = False) -> list[tuple[float, str, Any]]:
+    """Events of one walk in order of time: ``command``, ``gait``, ``stop`` (whether), with changes
+    ``set`` (a mapping) and ``mode``, and with gaits by speed ``set`` instead of ``gait``; those of
+    a longer one begin with them.
     """
-    jumps, changes, stops, settings, modes = np.random.default_rng(seed).spawn(5)
+    jumps, changes, stops, settings, modes, choices = np.random.default_rng(seed).spawn(6)
 
     def times(rng: np.random.Generator, between: tuple[float, float]) -> Iterator[float]:
         at = 0.0
@@ -121,7 +139,11 @@ def course(seed: int, seconds: float, limits: Velocity, gaits: Sequence[str] = G
     events: list[tuple[float, str, Any]] = [
         (at, 'command', tuple((jumps.uniform(-1.0, 1.0, 3) * limits).tolist()))
         for at in chain((0.0,), times(jumps, JUMPS))]
-    events += [(at, 'gait', str(changes.choice(gaits))) for at in times(changes, CHANGES)]
+    if auto_gait:
+        events += [(at, 'set', choice(choices, gaits))
+                   for at in chain((0.0,), times(choices, CHOICES))]
+    else:
+        events += [(at, 'gait', str(changes.choice(gaits))) for at in times(changes, CHANGES)]
     begin = 0.0
     for at in times(stops, STOPS):
         if at > begin:  # not while the stop before is held
@@ -139,11 +161,20 @@ def setting(rng: np.random.Generator) -> dict[str, Any]:
     name = str(rng.choice([*NUMBERS, *WORDS]))
     if name in WORDS:
         return {name: WORDS[name][rng.integers(len(WORDS[name]))]}
-    return {name: float(np.exp(rng.uniform(*np.log(NUMBERS[name]))))}
+    return {name: log_uniform(rng, *NUMBERS[name])}
+
+
+def choice(rng: np.random.Generator, gaits: Sequence[str]) -> dict[str, Any]:
+    """Draw gaits that are chosen by speed, in any order, and the speeds at which."""
+    band = log_uniform(rng, *BAND)
+    borders = np.cumsum([band + log_uniform(rng, *APART) for _ in range(
+        int(rng.integers(1, min(4, len(gaits)))))]).tolist()
+    return {'auto_gait': True, 'auto_hysteresis': band, 'auto_speeds': tuple(borders),
+            'auto_gaits': tuple(map(str, rng.choice(gaits, len(borders) + 1, replace=False)))}
 
 
 def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[str] = GAITS,
-          changes: bool = False) -> Outcome:
+          changes: bool = False, auto_gait: bool = False, disturbed: bool = False) -> Outcome:
     """Walk one course, from a gait that its seed draws.
 
     Parameters
@@ -158,13 +189,21 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
         Gaits to change among.
     changes : bool
         Whether parameters change and the robot lies down and stands up meanwhile.
+    auto_gait : bool
+        Whether the gait is chosen by speed; at least two of ``gaits`` then.
+    disturbed : bool
+        Whether the robot is disturbed meanwhile.
     """
     first = gaits[seed % len(gaits)]
     p = suite_of(robot=robot).parameters.reference
     limits = (p.max_speed, p.max_lateral_speed, p.max_turn_rate)
-    run, outcome = Walk(first, robot, seed=seed + 1), Outcome(seed)
+    disturbance = Disturbance.drawn(seed) if disturbed else UNDISTURBED
+    run = Walk(first, robot, disturbance.world, seed + 1, disturbance.values)
+    outcome = Outcome(seed, disturbed=disturbance.told)
     loop, asked, open_stop = run.loop, (0.0, 0.0, 0.0), None
-    events = course(seed, seconds, limits, gaits, changes)
+    events = course(seed, seconds, limits, gaits, changes, auto_gait)
+    if disturbance.pushes:
+        events = sorted(events + pushes(seed, seconds), key=lambda event: event[0])
     foot_speed = loop.canonical.scale.foot_speed
     for k in range(round(seconds / run.tick_s)):
         stops = False
@@ -184,6 +223,9 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
                 with suppress(DataError):  # such as to stand up while it stands
                     loop.request_mode(value)
                     open_stop = None
+            elif what == 'push':
+                push(run, *value)
+                outcome.pushed += 1
             else:
                 stops, open_stop = value and not loop.inhibition.requested, None
                 with suppress(DataError):  # a start while it does not stand
@@ -227,13 +269,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
                         metavar='GAIT', help='gaits to change among (default: all six)')
     parser.add_argument('--changes', action='store_true', help='parameters change, and the robot '
                         'lies down and stands up, meanwhile')
+    parser.add_argument('--auto-gait', action='store_true', help='the gait is chosen by speed')
+    parser.add_argument('--disturbed', action='store_true', help='a slippery floor, hills and '
+                        'bumps, a payload, pushes: each walk has some of them')
     parser.add_argument('--seed', type=int, default=0, help='of the first walk (default: 0)')
     return run_command(parser, arguments, _study)
 
 
 def _study(options: argparse.Namespace, _: RosArguments) -> int:
     walk = partial(trial, seconds=options.seconds, robot=options.robot, gaits=options.gaits,
-                   changes=options.changes)
+                   changes=options.changes, auto_gait=options.auto_gait,
+                   disturbed=options.disturbed)
     outcomes = []
     with Workers(options.workers, options.cluster, progress=True) as workers:
         for outcome in workers.map(walk, range(options.seed, options.seed + options.runs)):

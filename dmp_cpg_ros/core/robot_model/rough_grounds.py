@@ -164,14 +164,22 @@ def _hills(degrees: float, wave: float, seed: int) -> Surface:
     begin, end = PATCH - LEVEL, PATCH + LENGTH
     x = np.linspace(begin, end, round((end - begin) / GRID) + 1)
     y = np.linspace(-HALF_WIDTH, HALF_WIDTH, round(2.0 * HALF_WIDTH / GRID) + 1)
-    draw, height = np.random.default_rng(seed), np.zeros((len(y), len(x)))
+    height = waves(degrees, wave, np.random.default_rng(seed), x, y)
+    into = np.clip(x - PATCH - 1e-9, 0.0, 1.0)
+    height = np.maximum(height, 0.05 - THICKNESS) * into ** 2 * (3.0 - 2.0 * into)
+    height.flags.writeable = False
+    return Surface((begin, end), (-HALF_WIDTH, HALF_WIDTH), height)
+
+
+def waves(degrees: float, wave: float, draw: np.random.Generator, x: Array, y: Array) -> Array:
+    """Heights of waves from all directions at the corners of a grid, ndarray (along y, along x)
+    [m]; steepness and length as of :class:`Hills`.
+    """
+    height = np.zeros((len(y), len(x)))
     for _ in range(WAVES):
         angle, turn = draw.uniform(0.0, 2.0 * pi, 2)
         rate = 2.0 * pi / (wave * draw.uniform(2.0 / 3.0, 4.0 / 3.0))
         size = tan(radians(degrees)) * (2.0 / WAVES) ** 0.5 / rate
         height += size * np.cos(
             rate * (np.cos(angle) * x + np.sin(angle) * y[:, None]) + turn)
-    into = np.clip(x - PATCH - 1e-9, 0.0, 1.0)
-    height = np.maximum(height, 0.05 - THICKNESS) * into ** 2 * (3.0 - 2.0 * into)
-    height.flags.writeable = False
-    return Surface((begin, end), (-HALF_WIDTH, HALF_WIDTH), height)
+    return height
