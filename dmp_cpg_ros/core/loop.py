@@ -21,6 +21,7 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.body_estimate import estimated_state
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
 from dmp_cpg_ros.core.estimation.parameters import ESTIMATE
+from dmp_cpg_ros.core.gait.choice import changing_to
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits, quarter_weight
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
@@ -174,7 +175,7 @@ class WalkingLoop:
         self.stop = self.supervisor.step(
             self.stop, state.time_ns, network, x, x_dot, r, command, self.votes.tally,
             self.mode.mode, feedback.margins, feedback.progress,
-            None if self.parameters.gait_choice.auto_gait else canon.wanted)
+            changing_to(self.parameters.gait_choice, gait, canon.wanted))
         self.inhibition = self.supervisor.inhibition(self.stop)
         targets = self._joint_targets(state, x_dot, feedback, dt)
         return Tick(state.time_ns, r, x, x_dot, self.stop, feedback, targets, self.mode, gait)

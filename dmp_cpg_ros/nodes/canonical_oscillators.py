@@ -20,9 +20,9 @@ from dmp_cpg_ros.core.canonical.inhibition import (
 from dmp_cpg_ros.core.certificates.lock_watch import LOCKED, LOST, PhaseLock, PhaseLockWatch
 from dmp_cpg_ros.core.clock import fresh
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.contact_feedback import quarter_weight
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.gait.running import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.handover import SilentStop

@@ -156,7 +156,7 @@ class InhibitionNode(SuiteNode):
             before.state in ('walking', 'free'), self._inbox.take(self._votes.memory.asks))
         self._state = self._supervisor.step(
             before, stamp_ns, network, self._x, self._x_dot, self._r, self._gate.at(stamp_ns),
-            self._votes.tally, self._barring, margins, progress, self.certified.wanted,
+            self._votes.tally, self._barring, margins, progress, self.certified.changing(gait),
             self._lead_ns == 0 or self._announced.stops)
         self._announce()
         # it goes with a clock that is set back
@@ -388,7 +388,8 @@ class InhibitionNode(SuiteNode):
         changed, and answer the request once it has been predicted.
         """
         state, present = self._state, self._network.gait
-        wanted = self.certified.wanted or self.certified.gaits.named(present.ends[-1].name)
+        changing = self.certified.changing(present)
+        wanted = self.certified.gaits.named((changing.wanted if changing else present).name)
         tick_ns = self.parameters_of(TickParameters).tick_ns
 
         def known(error: Exception | None) -> None:

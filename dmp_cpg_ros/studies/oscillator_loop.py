@@ -15,6 +15,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.certificates.gate import Running
+from dmp_cpg_ros.core.gait.choice import changing_to
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.handover import adopted
@@ -198,7 +199,8 @@ class Oscillators(WalkingLoop):
             self.stop, self.now_ns, self.network, canon.x, canon.x_dot, self.r, command,
             self.votes.tally,
             margins=self._margins if self.now_ns <= self._pushed_until_ns else None,
-            wanted=canon.wanted, acts=self._lead_ns == 0 or self._announced.stops)
+            changing=changing_to(self.parameters.gait_choice, canon.gait, canon.wanted),
+            acts=self._lead_ns == 0 or self._announced.stops)
         self.inhibition = self.supervisor.inhibition(self.stop)
         self._announced = self._announced.after(self.stop, self.inhibition, self._lead_ns)
 

@@ -16,16 +16,13 @@ new parameters at once: they enter ẋ and leave x as it is. The factor on the c
   once: the oscillators are turned to their places in it and to its equilibrium, and the legs,
   whose swing height and speed are zero, stay where they are. Where votes alone hold the gait and
   could not hold the new one, the change waits until the gait runs or the service stops it.
-
-The gait may be chosen by speed. Animals change gait at similar dimensionless speeds û = u/√(g l)
-(Alexander & Jayes 1983: from walk to trot about û = 0.7, Froude number 0.5), and later when they
-speed up than when they slow down; the band between keeps the choice from flickering.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import copysign
 
 import numpy as np
@@ -36,9 +33,9 @@ from dmp_cpg_ros.core.canonical.inhibition import (
     initial_inhibition,
 )
 from dmp_cpg_ros.core.canonical.phase import turned
-from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait import contact_feedback as contacts
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, chosen_gait, limiting_gaits
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import AT_REST, CanonicalParameters, GaitNetwork
@@ -49,60 +46,7 @@ from dmp_cpg_ros.core.gait.transition import (
     changing_speed,
 )
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.records import made_often, replace_unchecked
-from dmp_cpg_ros.core.parameters import Parameters, parameter
-
-
-@dataclass(frozen=True)
-class GaitChoiceParameters(Parameters):
-    """Automatic choice of the gait."""
-
-    auto_gait: bool = parameter(False, 'whether the gait is chosen by the reference speed')
-    auto_gaits: tuple[str, ...] = parameter(
-        ('walk', 'trot'), 'gaits that auto_gait chooses among, from slow to fast')
-    auto_speeds: tuple[float, ...] = parameter(
-        (0.3,), 'dimensionless foot speeds u / sqrt(g l) at which auto_gait changes to the next '
-        'gait', 0.0, 10.0)
-    auto_hysteresis: float = parameter(
-        0.05, 'width of the band around each of auto_speeds in which auto_gait keeps the gait',
-        0.0, 2.0)
-
-    def __post_init__(self) -> None:
-        """Validate; one speed between every two gaits, and bands that do not overlap."""
-        super().__post_init__()
-        if len(self.auto_speeds) != len(self.auto_gaits) - 1:
-            raise ParameterError(
-                f'auto_speeds = {list(self.auto_speeds)} must hold one speed between every two of '
-                f'auto_gaits = {list(self.auto_gaits)}')
-        if len(set(self.auto_gaits)) != len(self.auto_gaits):
-            raise ParameterError(f'auto_gaits = {list(self.auto_gaits)} must not repeat a gait')
-        if np.any(np.diff(self.auto_speeds) <= self.auto_hysteresis):
-            raise ParameterError('auto_speeds must increase by more than auto_hysteresis')
-
-
-def limiting_gaits(parameters: GaitChoiceParameters, name: str, named: Callable[[str], Gait],
-                   cadence_scale: float = 1.0) -> tuple[Gait, ...]:
-    """Gaits whose limits commands are to keep.
-
-    Parameters
-    ----------
-    parameters : GaitChoiceParameters
-        Whether the gait is chosen, and among which.
-    name : str
-        Gait that is wanted where it is not chosen.
-    named : callable (str) → Gait
-        Gait of a name.
-    cadence_scale : float
-        Factor on the cadence that is wanted.
-
-    Returns
-    -------
-    tuple of Gait
-        The gait, or all that may be chosen.
-    """
-    names = parameters.auto_gaits if parameters.auto_gait else (name,)
-    return tuple(named(each).limiting(cadence_scale) for each in names)
 
 
 def limits_on_the_way(parameters: GaitChoiceParameters, name: str, named: Callable[[str], Gait],
@@ -120,39 +64,6 @@ def limits_on_the_way(parameters: GaitChoiceParameters, name: str, named: Callab
         return gaits, (), 0.0
     return (gaits, limiting_gaits(parameters, name, named, acting),
             abs(acting - wanted) / CADENCE_RATE)
-
-
-def chosen_gait(parameters: GaitChoiceParameters, present: str, r: Array, scale: BodyScale) -> str:
-    """Gait for a reference.
-
-    Parameters
-    ----------
-    parameters : GaitChoiceParameters
-        Gaits, speeds, band.
-    present : str
-        Gait that is wanted now; it is kept when ``auto_gait`` is off.
-    r : ndarray (3,)
-        Reference v_x, v_y [m/s], γ [rad/s].
-    scale : BodyScale
-        The robot's lengths.
-
-    Returns
-    -------
-    str
-    """
-    p = parameters
-    if not p.auto_gait:
-        return present
-    speed = scale.foot_speed(float(r[0]), float(r[1]), float(r[2]))
-    speed /= (GRAVITY * scale.leg_length) ** 0.5
-    if present not in p.auto_gaits:
-        return p.auto_gaits[sum(speed > border for border in p.auto_speeds)]
-    place, half = p.auto_gaits.index(present), 0.5 * p.auto_hysteresis
-    while place < len(p.auto_speeds) and speed > p.auto_speeds[place] + half:
-        place += 1
-    while place > 0 and speed < p.auto_speeds[place - 1] - half:
-        place -= 1
-    return p.auto_gaits[place]
 
 
 CADENCE_RATE = 0.5
@@ -261,6 +172,11 @@ class RunningGait:
         return CanonicalState(network.gait, gait, factor, x, np.zeros_like(x),
                               contacts.initial_contact_state())
 
+    @cached_property
+    def _choices(self) -> tuple[Gait, ...]:
+        """Gaits that are chosen among, with their limits."""
+        return limiting_gaits(self.choice, '', self.gaits.named, self.parameters.cadence_scale)
+
     def cadence_rate(self, state: CanonicalState) -> float:
         """Rate of the factor on the cadence [1/s]."""
         way = self.parameters.cadence_scale - state.cadence_scale
@@ -296,7 +212,8 @@ class RunningGait:
         """
         wanted = state.wanted
         if self.choice.auto_gait:
-            wanted = self.gaits.named(chosen_gait(self.choice, wanted.name, r, self.scale))
+            wanted = self.gaits.named(chosen_gait(
+                self.choice, wanted.name, r, self.scale, self._choices))
         gait, cadence_scale = self._at_cadence(state, inhibition.quickness, dt)
         turns = inhibition.opposite and float(np.abs(state.x_dot).max()) <= AT_REST
         network, x = self._begin_change(

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.gait.choice import Changing
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.transition import changing_speed
 from dmp_cpg_ros.core.inhibition.push_recovery import PUSHED
@@ -81,21 +81,25 @@ def followed_share(share: float, left: float | None, dt: float, most: float = 1.
     return min(regained, max(least, (left - DISTURBED) / (EASY - DISTURBED)))
 
 
-def changing_share(network: GaitNetwork, wanted: Gait, command: tuple[float, float, float]
+def changing_share(network: GaitNetwork, changing: Changing, command: tuple[float, float, float]
                    ) -> float:
-    """Share of a command at which the gait in force becomes the one that is wanted; 1 when it is.
+    """Share of a command at which the gait in force becomes the one that is wanted; 1 when it is,
+    and as much of it as has chosen that gait.
 
     Parameters
     ----------
     network : GaitNetwork
         With the gait in force.
-    wanted : Gait
-        That was asked for.
+    changing : Changing
+        Into which gait, and who chose it.
     command : tuple of float
         v_x, v_y [m/s], γ [rad/s].
     """
+    (wanted, chosen), scale = changing, network.scale
     if network.gait.name == wanted.name:
         return 1.0
-    most = network.scale.speed(changing_speed(network.gait, wanted, network.scale))
-    speed = wanted.limiting_speed(command, network.scale)
-    return 1.0 if speed <= most else most / speed
+    most = scale.speed(changing_speed(network.gait, wanted, scale))
+    speed, chosen = wanted.limiting_speed(command, scale), scale.speed(chosen)
+    if speed <= most:
+        return 1.0
+    return min(1.0, max(most / speed, chosen / scale.foot_speed(*command) if chosen else 0.0))

@@ -31,7 +31,7 @@ from dmp_cpg_ros.core.canonical.inhibition import (
 )
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
 from dmp_cpg_ros.core.clock import time_step
-from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.gait.choice import Changing
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.blocked import NO_BLOCK, Progress, block_step
 from dmp_cpg_ros.core.inhibition.caution import (
@@ -143,7 +143,7 @@ class GaitSupervisor:
              x_dot: Array, r: Array, command: tuple[float, float, float],
              tally: Tally | None = None, body_mode: str = 'standing',
              margins: Sequence[float] | None = None, progress: Progress | None = None,
-             wanted: Gait | None = None, acts: bool = True) -> SupervisorState:
+             changing: Changing | None = None, acts: bool = True) -> SupervisorState:
         """Advance by one tick.
 
         Parameters
@@ -166,8 +166,8 @@ class GaitSupervisor:
             Of the capture point in the support polygon, where they are known [m].
         progress : Progress, optional
             Of the body, where it is known.
-        wanted : Gait, optional
-            Gait that was asked for, into which the one that acts changes at a lower speed.
+        changing : Changing, optional
+            Of the gait, at a lower speed.
         acts : bool
             Whether a stop that is requested acts; inhibition is not armed before it does.
         """
@@ -187,7 +187,7 @@ class GaitSupervisor:
         state = self._blocked(state, r, command, progress, network, body_mode, dt)
         state = self._voted(state, tally or state.tally, network)
         state = self._pushed(state, network, x, margins, body_mode)
-        most = 1.0 if wanted is None else changing_share(network, wanted, command)
+        most = 1.0 if changing is None else changing_share(network, changing, command)
         quick = state.quickness > 1.0
         state = self._balancing(state, margins, network, progress or Progress(), r, most, dt)
         if state.requested:  # until it acts the reference may speed up

@@ -71,8 +71,8 @@ class CommandGate:
     scale : BodyScale, optional
         The robot's lengths, for the limits of the gait and of curves.
     gaits : sequence of Gait
-        Whose limits are kept, see :func:`~dmp_cpg_ros.core.gait.running.limiting_gaits`: those of
-        the fastest.
+        Whose limits are kept, see :func:`~dmp_cpg_ros.core.gait.choice.limiting_gaits`: those of
+        the last.
 
     Attributes
     ----------
@@ -103,10 +103,10 @@ class CommandGate:
         passing_s : float
             For how long it moves [s].
         """
-        self.parameters, scale = parameters, self._scale
+        self.parameters = parameters
         self._passing_ns, self._passed_ns = round(1e9 * passing_s), inf
-        self._ends = () if scale is None else tuple(
-            max(each, key=lambda gait: gait.highest(scale)) for each in (gaits, passing) if each)
+        self._ends = () if self._scale is None else tuple(
+            each[-1] for each in (gaits, passing) if each)
         self._limit()
 
     def accept(self, v_x: float, v_y: float, gamma: float) -> None:
@@ -129,7 +129,7 @@ class CommandGate:
         self._limit()
 
     def _limit(self) -> None:
-        """Bring the command within its range, and then within the limits of the fastest gait at
+        """Bring the command within its range, and then within the limits of the last gait at
         the cadence that is wanted, and at the one that acts.
         """
         p, (v_x, v_y, gamma) = self.parameters, self.asked

@@ -21,15 +21,11 @@ from dmp_cpg_ros.core.certificates import gate
 from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.certificates.verdict import Change, Verdict
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.choice import Changing, GaitChoiceParameters, changing_to
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.gait.running import (
-    CADENCE_RATE,
-    GaitChoiceParameters,
-    RunningGait,
-    limits_on_the_way,
-)
+from dmp_cpg_ros.core.gait.running import CADENCE_RATE, RunningGait, limits_on_the_way
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.parameters import typed
@@ -330,13 +326,11 @@ class Certified:
             self._node.parameters_of(ReferenceParameters), self._scale.hip_radius,
             Governor(self._limits()[0], self._scale))
 
-    @property
-    def wanted(self) -> Gait | None:
-        """Gait that is asked for; None where it is chosen."""
+    def changing(self, gait: GaitInForce) -> Changing | None:
+        """Change of the gait in force that shortens commands, None for none."""
         of = self._node.parameters_of
-        if of(GaitChoiceParameters).auto_gait:
-            return None
-        return self.gaits.named(of(suite.GaitParameters).gait)
+        return changing_to(of(GaitChoiceParameters), gait,
+                           self.gaits.named(of(suite.GaitParameters).gait))
 
     def _limits(self) -> tuple[tuple[Gait, ...], tuple[Gait, ...], float]:
         of = self._node.parameters_of

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from dmp_cpg_ros.configuration import ROBOTS, find_config
 from dmp_cpg_ros.core.clock import RESET_NS
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
-from dmp_cpg_ros.core.gait.running import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.suite_parameters import GaitParameters, RobotFileParameters

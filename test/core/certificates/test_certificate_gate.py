@@ -16,9 +16,10 @@ from dmp_cpg_ros.core.certificates.certify import OSCILLATOR_ROWS
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.verdict import MOST_EFFORT, Change
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares, KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, network_system
-from dmp_cpg_ros.core.gait.running import CADENCE_RATE, GaitChoiceParameters, RunningGait
+from dmp_cpg_ros.core.gait.running import CADENCE_RATE, RunningGait
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.maths.roots import last_that_holds

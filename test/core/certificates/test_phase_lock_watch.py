@@ -18,9 +18,10 @@ from dmp_cpg_ros.core.certificates.lock_watch import (
     PhaseLockWatch,
 )
 from dmp_cpg_ros.core.certificates.network import EXPECTED_MISMATCH
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.gait.running import GaitChoiceParameters, RunningGait
+from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 
 R = np.array([0.3, 0.0, 0.0])

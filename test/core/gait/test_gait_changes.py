@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from core_examples import GAITS, TICK, TICK_NS, quadruped, standing_state
@@ -18,9 +20,9 @@ from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.changes import certify_changes
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, chosen_gait
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares, shares_of
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.gait.running import GaitChoiceParameters, chosen_gait
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitTransition
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.maths.constants import GRAVITY
@@ -230,6 +232,21 @@ def test_the_choice_has_hysteresis() -> None:
     down = [gait := chosen(gait, speed) for speed in np.linspace(0.605, 0.005, 61)]
     assert up.index('amble') == 25 and up.index('trot') == 45            # 0.255, 0.455
     assert down.index('amble') == 26 and down.index('walk') == 46        # 0.345, 0.145
+
+
+def test_a_gait_is_not_kept_beyond_its_highest_speed() -> None:
+    choice = replace(CHOICE, auto_speeds=(0.2, 5.0))
+    gaits, root = [GAITS[name] for name in choice.auto_gaits], (GRAVITY * SCALE.leg_length) ** 0.5
+
+    def course(gait: str, speeds: np.ndarray) -> list[str]:
+        return [gait := chosen_gait(choice, gait, np.array([u * root, 0.0, 0.0]), SCALE, gaits)
+                for u in speeds]
+
+    up, down = (course(*of) for of in (
+        ('walk', np.linspace(0.0, 2.0, 201)), ('trot', np.linspace(2.0, 0.0, 201))))
+    highest = GAITS['amble'].highest_speed
+    assert 0.01 * up.index('trot') == pytest.approx(highest, abs=0.0101)
+    assert 2.0 - 0.01 * down.index('amble') == pytest.approx(highest - 0.1, abs=0.0101)
 
 
 @given(st.sampled_from(['walk', 'amble', 'trot', 'pronk']), st.floats(0.0, 1.0))

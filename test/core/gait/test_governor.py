@@ -15,10 +15,12 @@ from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.reference.governor import LEAST, Governor
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.model_reader import load_description
+from dmp_cpg_ros.studies.disturbances import Disturbance, pushes
 from dmp_cpg_ros.studies.random_commands import GAITS, course, touches_itself, trial
 from dmp_cpg_ros.studies.walking_trials import Walk, attitude, steady
 from dmp_cpg_ros.suite import load_gaits, load_suite
@@ -128,6 +130,23 @@ def test_equal_seeds_give_equal_courses_of_every_kind_of_event() -> None:
     more = course(3, 60.0, limits, changes_too=True)
     assert [event for event in more if event[1] in ('command', 'gait', 'stop')] == events
     assert {what for _, what, _ in more} == {'command', 'gait', 'stop', 'set', 'mode'}
+    by_speed = course(3, 60.0, limits, auto_gait=True)
+    assert [event for event in by_speed if event[1] != 'set'] == [
+        event for event in events if event[1] != 'gait']
+    assert all(GaitChoiceParameters(**value) for _, what, value in by_speed if what == 'set')
+
+
+def test_a_walk_is_disturbed_by_some_of_everything() -> None:
+    drawn = [Disturbance.drawn(seed) for seed in range(40)]
+    assert Disturbance.drawn(3) == drawn[3] != drawn[4]
+    for name in ('friction', 'payload', 'bumps'):
+        assert 10 < sum(name in each.told for each in drawn) < 30
+    world = next(each.world for each in drawn if 'bumps' in each.told)
+    assert world is not None and world.height_at(0.2, -0.3) == 0.0
+    assert np.std(world.height_at(*np.random.default_rng(1).uniform(-50.0, 50.0, (2, 99)))) > 0.0
+    assert pushes(3, 61.0)[:5] == pushes(3, 60.0)[:5]
+    outcome = trial(1, 6.0, changes=True, auto_gait=True, disturbed=True)
+    assert outcome.fell == '' and outcome.disturbed and outcome.pushed == 1
 
 
 def test_a_robot_stays_up_under_random_commands_under_which_it_fell() -> None:

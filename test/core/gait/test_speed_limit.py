@@ -19,14 +19,14 @@ from dmp_cpg_ros.core.balance.controller import PostureController, PostureParame
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
-from dmp_cpg_ros.core.gait.gait import BACKWARD_WEIGHT, ONE_SIDED_WEIGHT, Gait
-from dmp_cpg_ros.core.gait.running import (
-    HASTE,
+from dmp_cpg_ros.core.gait.choice import (
+    Changing,
     GaitChoiceParameters,
-    approached,
+    changing_to,
     limiting_gaits,
-    limits_on_the_way,
 )
+from dmp_cpg_ros.core.gait.gait import BACKWARD_WEIGHT, ONE_SIDED_WEIGHT, Gait
+from dmp_cpg_ros.core.gait.running import HASTE, approached, limits_on_the_way
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit, swing_acceleration, within_limit
 from dmp_cpg_ros.core.gait.transition import (
     CHANGING,
@@ -249,7 +249,7 @@ def test_a_change_leads_from_limit_to_limit(before: float, after: float) -> None
     assert blended_limit(inf, inf, 0.3) == inf
 
 
-def test_commands_are_followed_up_to_the_gait_or_the_fastest_that_may_be_chosen() -> None:
+def test_commands_are_followed_up_to_the_gait_or_the_last_that_may_be_chosen() -> None:
     gate = CommandGate(ReferenceParameters(cmd_vel_timeout=0.0), SCALE)
     gate.accept(3.0, 0.0, 0.0)
     assert gate.at(0) == (3.0, 0.0, 0.0)
@@ -259,6 +259,9 @@ def test_commands_are_followed_up_to_the_gait_or_the_fastest_that_may_be_chosen(
     choice = GaitChoiceParameters(auto_gait=True)
     gate.follow(gate.parameters, limiting_gaits(choice, 'walk', GAITS.__getitem__))
     assert gate.at(2)[0] == pytest.approx(3.0)
+    choice = GaitChoiceParameters(auto_gait=True, auto_gaits=('trot', 'walk'))
+    gate.follow(gate.parameters, limiting_gaits(choice, 'walk', GAITS.__getitem__))
+    assert gate.at(3)[0] == pytest.approx(GAITS['walk'].highest_speed * ROOT)
 
 
 @pytest.mark.parametrize('gait', [GAITS['walk'], GaitTransition(GAITS['trot'], GAITS['walk']).at(
@@ -366,12 +369,39 @@ def test_who_has_the_gait_that_is_wanted_follows_all_of_the_command() -> None:
         assert changing_speed(way, wanted, SCALE) == CHANGING * walk.highest_speed
     network = Walk('trot').loop.network
     command = (2.0, 0.1, -0.3)
-    assert changing_share(network, network.gait, command) == 1.0
-    share = changing_share(network, walk, command)
+    assert changing_share(network, Changing(network.gait), command) == 1.0
+    share = changing_share(network, Changing(walk), command)
     shortened = tuple(share * value for value in command)
     assert walk.limiting_speed(shortened, network.scale) == pytest.approx(
         network.scale.speed(CHANGING * walk.highest_speed))
-    assert changing_share(network, walk, (0.0, 0.0, 0.0)) == 1.0
+    assert changing_share(network, Changing(walk), (0.0, 0.0, 0.0)) == 1.0
+
+
+def test_a_change_that_was_chosen_keeps_the_speed_at_which_it_was() -> None:
+    trot, walk = GAITS['trot'], GAITS['walk']
+    network, choice = Walk('trot').loop.network, GaitChoiceParameters(auto_gait=True)
+    assert changing_to(choice, trot, walk) is None
+    way, scale, command = GaitTransition(walk, trot).at(0.5, 0.1), network.scale, (-2.0, 0.1, 0.3)
+    for border, most in ((0.3, CHANGING * walk.highest_speed), (0.9, 0.925)):
+        changing = changing_to(replace(choice, auto_speeds=(border,)), way, walk)
+        assert changing is not None and changing == (trot, pytest.approx(border + 0.025))
+        share = changing_share(network.of(way), changing, command)
+        assert scale.foot_speed(*(share * value for value in command)) == pytest.approx(
+            scale.speed(most))
+
+
+@pytest.mark.skipif(not is_there('robots/go1'), reason='the model of Go1 is not installed')
+@pytest.mark.parametrize(('gaits', 'border', 'seed', 'end'), [
+    (('trot', 'pronk'), 0.25, 1, 2.5), (('pace', 'amble'), 0.3, 3, 2.5),
+    (('pace', 'amble'), 0.7, 2, 3.5)])
+def test_a_robot_stays_up_whose_gait_is_chosen_while_it_speeds_up(
+        gaits: tuple[str, ...], border: float, seed: int, end: float) -> None:
+    """It fell: while gaits changed, and in a gait whose reference went on without it."""
+    run = Walk(gaits[0], 'robots/go1', seed=seed, values=(
+        ('auto_gait', True), ('auto_gaits', gaits), ('auto_speeds', (border,)),
+        ('auto_hysteresis', 0.02)))
+    run.loop.command(3.5)
+    assert run.walk(end)
 
 
 @given(velocity=velocities, factor=st.floats(0.1, 3.0), name=st.sampled_from(sorted(GAITS)))
