@@ -10,7 +10,7 @@ A gait is kept up to its border, or up to its highest speed where that is lower,
 the highest speed of the last of the gaits: a reference that goes on beyond what the gait in force
 can do leaves the body behind, and a Go1 that ambled after one of 1.85 m/s at its 1.68 fell. Nor
 does a reference speed up while the gait changes, beyond what is borne when a change is asked for
-(:func:`~dmp_cpg_ros.core.gait.transition.changing_speed`) and the speed at which it was chosen.
+(:func:`~dmp_cpg_ros.core.gait.transition.changing_speed`).
 """
 
 from __future__ import annotations
@@ -129,12 +129,12 @@ class Changing(NamedTuple):
     ----------
     wanted : Gait
         Into which gaits change.
-    chosen : float
-        Dimensionless foot speed at which that was chosen, to which commands may go on; 0 for none.
+    chosen : bool
+        Whether it was chosen by speed, and is made at any.
     """
 
     wanted: Gait
-    chosen: float = 0.0
+    chosen: bool = False
 
 
 def changing_to(parameters: GaitChoiceParameters, gait: GaitInForce, asked: Gait
@@ -142,13 +142,6 @@ def changing_to(parameters: GaitChoiceParameters, gait: GaitInForce, asked: Gait
     """Change that shortens commands: into the gait that was asked for, begun or not; one that was
     chosen only once it has begun. None for none.
     """
-    p = parameters
-    if not p.auto_gait:
+    if not parameters.auto_gait:
         return Changing(asked)
-    if len(gait.ends) == 1:
-        return None
-    before, after = gait.ends[0], gait.ends[-1]
-    if not {before.name, after.name} <= set(p.auto_gaits):
-        return Changing(after)
-    first, last = sorted(p.auto_gaits.index(each.name) for each in (before, after))
-    return Changing(after, max(p.auto_speeds[first:last]) + 0.5 * p.auto_hysteresis)
+    return Changing(gait.ends[-1], True) if len(gait.ends) > 1 else None

@@ -25,7 +25,7 @@ force at once (:mod:`~dmp_cpg_ros.core.gait.running`).
 
 **How fast.** A change that is asked for begins when the reference has come down to
 :func:`changing_speed`, to which commands are shortened until it is done. One that ``auto_gait``
-chooses is made at the speed at which it was chosen, with commands up to the higher of both.
+chooses is made at the speed at which it was chosen, and speeds up to the higher of both at most.
 
 **The arcs.** Leg i is at the position o_i = rest − lag_i of its cycle when oscillator fl has phase
 0. From one gait to another it moves by the arc a_i ≡ o_i' − o_i (mod 1). Only differences matter:

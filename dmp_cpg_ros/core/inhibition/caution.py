@@ -81,10 +81,10 @@ def followed_share(share: float, left: float | None, dt: float, most: float = 1.
     return min(regained, max(least, (left - DISTURBED) / (EASY - DISTURBED)))
 
 
-def changing_share(network: GaitNetwork, changing: Changing, command: tuple[float, float, float]
-                   ) -> float:
-    """Share of a command at which the gait in force becomes the one that is wanted; 1 when it is,
-    and as much of it as has chosen that gait.
+def changing_share(network: GaitNetwork, changing: Changing, command: tuple[float, float, float],
+                   speed: float = 0.0) -> float:
+    """Share of a command at which the gait in force becomes the one that is wanted; 1 when it is.
+    One that was chosen is made at the speed of the reference, which gains none meanwhile.
 
     Parameters
     ----------
@@ -94,12 +94,12 @@ def changing_share(network: GaitNetwork, changing: Changing, command: tuple[floa
         Into which gait, and who chose it.
     command : tuple of float
         v_x, v_y [m/s], γ [rad/s].
+    speed : float
+        Foot speed of the reference [m/s].
     """
     (wanted, chosen), scale = changing, network.scale
-    if network.gait.name == wanted.name:
-        return 1.0
     most = scale.speed(changing_speed(network.gait, wanted, scale))
-    speed, chosen = wanted.limiting_speed(command, scale), scale.speed(chosen)
-    if speed <= most:
+    asked = wanted.limiting_speed(command, scale)
+    if network.gait.name == wanted.name or asked <= most:
         return 1.0
-    return min(1.0, max(most / speed, chosen / scale.foot_speed(*command) if chosen else 0.0))
+    return min(1.0, max(most / asked, speed / scale.foot_speed(*command) if chosen else 0.0))

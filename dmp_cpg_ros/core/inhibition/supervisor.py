@@ -187,7 +187,7 @@ class GaitSupervisor:
         state = self._blocked(state, r, command, progress, network, body_mode, dt)
         state = self._voted(state, tally or state.tally, network)
         state = self._pushed(state, network, x, margins, body_mode)
-        most = 1.0 if changing is None else changing_share(network, changing, command)
+        most = changing_share(network, changing, command, speed) if changing else 1.0
         quick = state.quickness > 1.0
         state = self._balancing(state, margins, network, progress or Progress(), r, most, dt)
         if state.requested:  # until it acts the reference may speed up

@@ -145,8 +145,8 @@ def test_a_walk_is_disturbed_by_some_of_everything() -> None:
     assert world is not None and world.height_at(0.2, -0.3) == 0.0
     assert np.std(world.height_at(*np.random.default_rng(1).uniform(-50.0, 50.0, (2, 99)))) > 0.0
     assert pushes(3, 61.0)[:5] == pushes(3, 60.0)[:5]
-    outcome = trial(1, 6.0, changes=True, auto_gait=True, disturbed=True)
-    assert outcome.fell == '' and outcome.disturbed and outcome.pushed == 1
+    outcome = trial(1, 8.5, changes=True, auto_gait=True, disturbed=True)
+    assert outcome.fell == '' and outcome.disturbed and outcome.pushed > 0
 
 
 def test_a_robot_stays_up_under_random_commands_under_which_it_fell() -> None:
