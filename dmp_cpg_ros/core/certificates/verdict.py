@@ -126,9 +126,11 @@ class Change:
         """Nearest values that work, as text, where an inequality of a name is lost."""
         looks = _Looks(MOST_EFFORT - self._judging)
         differences = self.present.differences(self.proposed)
+        band = differences.pop('auto_hysteresis', None)  # goes with auto_speeds, certifies nothing
         numbers = {name: pair for name, pair in differences.items() if isinstance(pair[0], float)}
         words = {name: pair[1] for name, pair in differences.items() if name not in numbers}
-        with_words = self.present.changed(words)
+        with_words = self.present.changed(
+            words if band is None else {**words, 'auto_hysteresis': band[1]})
         if words and looks.first_lost(with_words, name if numbers else ''):
             return self._choices(words, looks)
         if not (held or words) or not numbers:

@@ -332,3 +332,11 @@ def test_what_looking_for_a_value_that_works_takes_is_bounded_and_what_is_told_w
         assert asked.changed({name: float(value) for name, value in told.items()}).holds()
     else:
         assert 'what works' in verdict.reason or 'looked for' in verdict.reason
+
+
+def test_a_refusal_of_other_gaits_by_speed_says_what_works() -> None:
+    """It looked for it with the new borders and the old band, which do not go together."""
+    wide = RUNNING.changed({'auto_gait': True, 'auto_hysteresis': 0.2})
+    verdict = judge({'auto_gaits': ('walk', 'trot', 'pace'), 'auto_speeds': (0.3, 0.4),
+                     'auto_hysteresis': 0.05, 'coupling_gain': 0.01}, wide)
+    assert not verdict.accepted and 'nearest' in verdict.reason
