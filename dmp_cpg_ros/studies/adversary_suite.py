@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,10 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.coupling import TOPOLOGIES
 from dmp_cpg_ros.core.canonical.inhibition import AUTO
 from dmp_cpg_ros.core.canonical.phase import phase
+from dmp_cpg_ros.core.certificates.network import Setting
+from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import OWNER
@@ -76,7 +80,7 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
     for wait, kind, value in [*case['events'], [0.0, 'stop', None], [LONGEST, 'end', None]]:
         for _ in range(round(wait / case['tick_s'])):
             before, gait = phase(loop.x), loop.canon.gait.name
-            held = loop.held and loop.stop.armed
+            held, by = loop.held and loop.stop.armed, loop.acting.gains
             loop.advance()
             moved = (phase(loop.x) - before + np.pi) % (2.0 * np.pi) - np.pi
             if loop.canon.gait.name != gait:  # states turn at rest, and no leg moves
@@ -86,7 +90,7 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
             way += case['tick_s'] * float(np.hypot(*loop.r[:2]))
             if not np.all(np.isfinite(loop.x)):
                 return 'the oscillators diverge', closest
-            if held and loop.acting.requested and not loop.held:
+            if held and loop.acting.requested and not loop.held and _certain(loop, by):
                 return 'C is left again', closest
             if np.abs(turned).max() > STRIDE:
                 return 'a leg takes a stride while the stop is in force', closest
@@ -108,6 +112,14 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
             former, expected = expected, _do(loop, kind, value, expected, counts)
             way = way if expected is former else 0.0
     return ('' if loop.stop.state == 'at_rest' else 'the last stop does not end'), closest
+
+
+def _certain(loop: Oscillators, gains: Array) -> bool:
+    """Whether gains (4,) are certified to hold the legs: those of votes alone only have to be able
+    to hold them once they are at rest.
+    """
+    return loop.stop.asked or isfinite(vote_bound(Setting.of(
+        loop.network, loop.parameters, 1e-9 * loop.tick_ns), gains))
 
 
 def _kept(loop: Oscillators, expected: _Expected, way: float, tick_s: float) -> tuple[str, float]:
@@ -143,6 +155,8 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: _Expected | None,
             kind == 'stop' and not loop.stop.requested):
         return _promised(loop, loop.take_over if kind == 'take_over' else None)
     if kind in ('stop', 'take_over'):
+        if kind == 'stop' and not loop.stop.asked:               # votes hold it, too
+            loop.request(True)
         return expected
     if kind == 'start':
         news = loop.stop.requested

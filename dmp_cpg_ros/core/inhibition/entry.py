@@ -10,6 +10,7 @@ at which they are held, so that what is certified for a leg holds wherever it is
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from math import asin, pi, sqrt
@@ -134,8 +135,9 @@ def next_leg(network: GaitNetwork, inhibition: InhibitionParameters, x: Array,
     return found[1], found[2]
 
 
-def way_in(network: GaitNetwork, speed: float, span_s: float) -> float:
-    """Largest way of the oscillators within a time in which the feet get no faster [rad].
+def way_in(network: GaitNetwork, speed: float, rates: Sequence[float], span_s: float) -> float:
+    """Largest way of the oscillators within a time in which the feet get no faster [rad]; none
+    where they are held.
 
     Parameters
     ----------
@@ -143,13 +145,17 @@ def way_in(network: GaitNetwork, speed: float, span_s: float) -> float:
         That acts; its cadence may be on its way to that of its parameters.
     speed : float
         Of the feet [m/s].
+    rates : sequence of float
+        Phase rates of the oscillators, of which some are near ω where nothing holds them [rad/s].
     span_s : float
         The time [s].
     """
     acting, scale = network.gait.cadence_scale, network.scale
     rising = min(max(network.parameters.cadence_scale, acting), acting + CADENCE_RATE * span_s)
-    omega = max(network.gait.omega(speed, scale), network.gait.omega(0.0, scale))
-    return span_s * omega * rising / acting
+    omega = network.gait.omega(speed, scale)
+    if max(map(abs, rates)) <= 0.5 * omega:
+        return 0.0
+    return span_s * max(omega, network.gait.omega(0.0, scale)) * rising / acting
 
 
 def farthest_way(network: GaitNetwork, inhibition: InhibitionParameters) -> float:

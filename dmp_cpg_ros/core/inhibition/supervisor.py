@@ -302,7 +302,7 @@ class GaitSupervisor:
         if not inside:
             most = armed_speed(network.scale, self.parameters, self.reference)
             armed = speed <= most and self.in_places(network, x)
-            state = self._aimed(state, network, x, speed, armed)
+            state = self._aimed(state, network, x, rates, speed, armed)
             inside = self._inside(state, network, x)
         if not (armed and inside):
             return replace_unchecked(state, armed=armed, state='waiting')
@@ -318,13 +318,13 @@ class GaitSupervisor:
                                 rest_phase=state.rest_phase)
         return bool(network.acting_gains(once_armed, x).any())
 
-    def _aimed(self, state: SupervisorState, network: GaitNetwork, x: Array, speed: float,
-               armed: bool) -> SupervisorState:
+    def _aimed(self, state: SupervisorState, network: GaitNetwork, x: Array, rates: list[float],
+               speed: float, armed: bool) -> SupervisorState:
         """State with the leg that is to be caught; once it is, it is kept."""
         leg, rest_phase = state.leg, 0.0
         if armed and state.asked and self.parameters.auto:
             leg, rest_phase = next_leg(network, self.parameters, x, way_in(
-                network, speed, 1e-9 * self.lead_ns), leg if state.armed else None)
+                network, speed, rates, 1e-9 * self.lead_ns), leg if state.armed else None)
         same = (leg, rest_phase) == (state.leg, state.rest_phase)
         return state if same else replace_unchecked(state, leg=leg, rest_phase=rest_phase)
 

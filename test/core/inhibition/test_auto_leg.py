@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.canonical.inhibition import AUTO, InhibitionParameters
-from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.canonical.phase import phase, state_at, wrapped
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.inhibition.entry import half_arc, next_leg
 from dmp_cpg_ros.core.inhibition.handover import adopted
@@ -187,6 +187,24 @@ def test_the_leg_is_caught_that_comes_to_its_place_once_what_was_told_ahead_acts
             ticks += 1
             assert ticks * TICK <= bound
         assert ticks * TICK == pytest.approx(predicted, abs=1e-9)
+
+
+@pytest.mark.parametrize('lead', [0.024, 0.0675, 0.1])
+def test_a_stop_that_takes_back_a_start_keeps_the_legs_that_votes_hold(lead: float) -> None:
+    """They do not go on until what is told acts, so that the leg is chosen that is in its C."""
+    loop = Oscillators(ROBOT, {'gait': 'pace', 'tick_s': TICK, 'lead_s': lead, 'parameters': {
+        'auto_inhibit': False, 'inhibited_legs': (AUTO,), 'voting': True, 'silence_weight': 0.0}})
+    go(walking(go(loop, 0.1), 0.0, 2.0), 0.0)
+    loop.vote(dict.fromkeys(LEGS, 1.0))
+    go(loop, 3.0)
+    assert loop.stop.state == 'at_rest'
+    at = phase(loop.x)
+    loop.request(False)
+    loop.request(True)
+    for _ in range(200):
+        loop.advance()
+        assert np.abs(wrapped(phase(loop.x) - at)).max() < 0.5
+    assert loop.stop.state == 'at_rest'
 
 
 @settings(max_examples=60)
