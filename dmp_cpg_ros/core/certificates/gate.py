@@ -44,8 +44,8 @@ _CAPTURING = frozenset(('rho', 'radius', 'coupling_gain', 'coupling_graph', 'inh
                         'region_radius', 'inhibited_legs'))
 """Parameters that decide which set inhibition holds the legs in."""
 
-_WHOLE_EFFORT, _VOTES_EFFORT = 4, 4
-"""Of a whole certificate, and of what one set of voters can do in one network."""
+_WHOLE_EFFORT, _CLAMP_EFFORT = 4, 2
+"""Of a whole certificate, and of the gain with which a set of voters stops the gait."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Running:
                 self.parameters.canonical.coupling_graph, len(LEGS))))
         if self.parameters.voting.voting and (not among or among in VOTE_ROWS):
             networks = self.networks
-            votes = _VOTES_EFFORT * len(networks) * len(
+            votes = (_CLAMP_EFFORT + len(networks)) * len(
                 different_voters(networks[0].system, self.parameters.voting.majority))
         if among in VOTE_ROWS:
             return votes

@@ -15,7 +15,7 @@ from itertools import combinations
 from typing import Any
 
 from dmp_cpg_ros.core.canonical.inhibition import AUTO
-from dmp_cpg_ros.core.certificates.certify import OSCILLATOR_ROWS
+from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, OSCILLATOR_ROWS
 from dmp_cpg_ros.core.certificates.changes import refused_change
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality
@@ -30,9 +30,9 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 _ROUNDS = 5
 """How often the way to what is refused is halved at most."""
 
-MOST_EFFORT = 30
+MOST_EFFORT = 24
 """Most :meth:`Running.effort` of a verdict that looks for what would work, for its time to stay
-bounded: about 1.5 ms each on a slow core."""
+bounded: 1.5 to 2 ms each on a slow core."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +91,8 @@ class Change:
         if not lost:
             return Verdict(certificate, of.settled.certificate(), True)
         reason = ' | '.join(entry.explained() for entry in lost)
-        return Verdict(certificate, None, False,
-                       f'{reason}; {self._nearest(self.held.holds, lost[0].name)}')
+        nearest = self._nearest(max((entry.name for entry in lost), key=of.effort))
+        return Verdict(certificate, None, False, f'{reason}; {nearest}')
 
     def _worse(self, entry: Inequality) -> bool:
         """Whether an inequality that fails held before, or failed by less."""
@@ -112,19 +112,21 @@ class Change:
     def _settled(self) -> Change:
         return replace(self, present=self.present.settled, proposed=self.proposed.settled)
 
-    @property
-    def _judging(self) -> int:
-        """Effort of a verdict that does not look for what would work: of the certificate, of the
-        changes from what is walked to another gait, and of the votes that were not looked at.
+    def _judging(self, name: str) -> int:
+        """Effort until an inequality of a name was found to be lost: of the certificate, in which
+        votes are looked at last, of changes from what is walked to other gaits, and of the votes
+        of what runs where others of its rows fail.
         """
         of, before = self.proposed, self.present
         others = (of.gait, of.others) != (before.gait, before.others)
-        return of.effort() * (1 + others) + (
-            before.parameters.voting.voting and not self.held.holds) * before.effort(VOTE_ROWS[0])
+        return of.effort('' if name in VOTE_ROWS else BEFORE_VOTES) * (1 + others) + (
+            name in VOTE_ROWS and not self.held.holds) * before.effort(name)
 
-    def _nearest(self, held: bool, name: str) -> str:
-        """Nearest values that work, as text, where an inequality of a name is lost."""
-        looks = _Looks(MOST_EFFORT - self._judging)
+    def _nearest(self, name: str) -> str:
+        """Nearest values that work, as text, where an inequality of a name is lost, of several the
+        one that is looked at with most effort.
+        """
+        looks = _Looks(MOST_EFFORT - self._judging(name))
         differences = self.present.differences(self.proposed)
         band = differences.pop('auto_hysteresis', None)  # goes with auto_speeds, certifies nothing
         numbers = {name: pair for name, pair in differences.items() if isinstance(pair[0], float)}
@@ -133,7 +135,7 @@ class Change:
             words if band is None else {**words, 'auto_hysteresis': band[1]})
         if words and looks.first_lost(with_words, name if numbers else ''):
             return self._choices(words, looks)
-        if not (held or words) or not numbers:
+        if not (self.held.holds or words) or not numbers:
             return 'nothing nearer is known: the running parameters are not certified themselves'
         values = nearest_values(
             numbers, lambda at, among: looks.first_lost(with_words.changed(at), among),
