@@ -341,3 +341,12 @@ def test_a_refusal_of_other_gaits_by_speed_says_what_works() -> None:
     verdict = judge({'auto_gaits': ('walk', 'trot', 'pace'), 'auto_speeds': (0.3, 0.4),
                      'auto_hysteresis': 0.05, 'coupling_gain': 0.01}, wide)
     assert not verdict.accepted and 'nearest' in verdict.reason
+
+
+def test_where_only_some_of_the_legs_hold_the_certificate_says_what_fails() -> None:
+    """Votes are looked at for the legs that hold alone."""
+    running = RUNNING.changed({'coupling_graph': 'star', 'coupling_gain': 36.0, 'voting': True,
+                               'inhibition_gain': 3125.0, 'inhibited_legs': ('auto',)})
+    failing = [row.name for row in running.certificate().failing]
+    assert failing and not running.holds() and failing == [
+        row.name for row in running.certificate(whole=True).failing]
