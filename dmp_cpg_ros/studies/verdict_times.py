@@ -68,8 +68,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         judged += _judged(rng)
     print(markdown_table(
         ('changes', 'number', 'median [ms]', '99 % [ms]', 'longest [ms]', 'within 50 ms'),
-        [_row(name, [each for each in judged if each.accepted in of])
-         for name, of in (('accepted', (True,)), ('refused', (False,)))]))
+        [_row(name, [each for each in judged if each.accepted == accepted])
+         for name, accepted in (('accepted', True), ('refused', False))]))
     slowest = max(judged, key=lambda each: each.seconds)
     print(f'slowest: {asdict(slowest)}')
     write_results(options.json, [asdict(each) for each in judged])
@@ -98,7 +98,7 @@ def _judged(rng: np.random.Generator) -> list[Judged]:
         return []
     judged = []
     for _ in range(10):
-        values, proposed, walked = dict[str, Any](), running, (first, *others)
+        values, proposed = dict[str, Any](), running
         try:
             if rng.random() < 0.2:
                 gait = GAITS[str(rng.choice(list(GAITS)))]
@@ -111,7 +111,7 @@ def _judged(rng: np.random.Generator) -> list[Judged]:
                 proposed = replace(proposed, acting_cadence=float(rng.uniform(0.7, 2.0)))
         except DmpCpgError:
             continue
-        change = Change(running, held, proposed, walked)
+        change = Change(running, held, proposed, (first, *others))
         begin = time.process_time()
         try:
             accepted = change.verdict().accepted

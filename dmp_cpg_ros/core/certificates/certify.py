@@ -85,9 +85,8 @@ def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = Fal
             required_only, until_lost, until, votes))
         if until_lost and not found[-1].holds:
             return found[-1]
-    count = min(len(each.inequalities) for each in found)  # votes are left out where one is lost
-    rows = [min(same, key=lambda row: (row.holds, row.margin))
-            for same in zip(*(each.inequalities[:count] for each in found), strict=True)]
+    rows = [min(same, key=lambda row: (row.holds, row.margin))  # without votes where one is lost
+            for same in zip(*(each.inequalities for each in found), strict=False)]
     clearance = s.parameters.leg.clearance * REST_ACTIVITY
     rows = [row if row.name != 'rest_posture' or math.isinf(row.left) else replace(
         row, left=max(row.left, clearance)) for row in rows]

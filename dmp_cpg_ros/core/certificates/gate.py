@@ -45,7 +45,9 @@ _CAPTURING = frozenset(('rho', 'radius', 'coupling_gain', 'coupling_graph', 'inh
 """Parameters that decide which set inhibition holds the legs in."""
 
 _WHOLE_EFFORT, _CLAMP_EFFORT = 4, 2
-"""Of a whole certificate, and of the gain with which a set of voters stops the gait."""
+"""Of a whole certificate of one leg, and of the gain with which a set of voters stops the gait;
+from times of a processor that were measured.
+"""
 
 
 @dataclass(frozen=True)
@@ -103,9 +105,9 @@ class Running:
         return votes_among(of.parameters, of.networks, of.tick_s, until_lost=until_lost)
 
     def effort(self, among: str = '') -> int:
-        """How long :meth:`first_lost` takes at most, but for single ones, in rows of one network
-        that concern oscillators alone: the whole certificate takes some of them for each leg that
-        may be chosen and is not alike another, and votes for each network and set of voters.
+        """How long :meth:`first_lost` takes, mostly no longer; 1 is one of ``OSCILLATOR_ROWS`` for
+        one leg. ``auto`` takes as much for each leg that is not alike another, and votes some for
+        each set of voters in each network.
         """
         kinds, eligible, votes = 1, 0, 0
         if self.parameters.inhibition.auto:
