@@ -86,9 +86,17 @@ class CanonicalSystem:
         -------
         M : ndarray (2N, 2N)
         c : ndarray (2N,)
+            Both are kept for the next time, and not to be written to.
         """
-        alpha = np.repeat(gains, 2)
-        return self._coupling - np.diag(alpha), alpha * self.target.ravel()
+        key = gains.tobytes()
+        linear = self._linear.get(key)
+        if linear is None:
+            if len(self._linear) > MOST_KEPT:
+                self._linear.clear()
+            alpha = np.repeat(gains, 2)
+            linear = self._linear[key] = (
+                self._coupling - np.diag(alpha), alpha * self.target.ravel())
+        return linear
 
     def field(self, x: Array, omega: float | Array, gains: Array) -> Array:
         """Vector field ẋ.
@@ -107,7 +115,7 @@ class CanonicalSystem:
         ndarray (N, 2)
             [1/s]
         """
-        (M, c), state = self._kept_linear_part(gains), x.ravel()
+        (M, c), state = self.linear_part(gains), x.ravel()
         return (M.dot(state) + c).reshape(x.shape) + self.oscillators.field(x, omega)
 
     def jacobian(self, x: Array, omega: float | Array, gains: Array) -> Array:
@@ -117,18 +125,9 @@ class CanonicalSystem:
         -------
         ndarray (2N, 2N)
         """
-        matrix = self._kept_linear_part(gains)[0].copy()
+        matrix = self.linear_part(gains)[0].copy()
         matrix[self._own] += self.oscillators.jacobian(x, omega).ravel()
         return matrix
-
-    def _kept_linear_part(self, gains: Array) -> tuple[Array, Array]:
-        key = gains.tobytes()
-        linear = self._linear.get(key)
-        if linear is None:
-            if len(self._linear) > MOST_KEPT:
-                self._linear.clear()
-            linear = self._linear[key] = self.linear_part(gains)
-        return linear
 
     def newton_step(self, x: Array, omega: float | Array, gains: Array, field: Array) -> Array:
         """States (N, 2) one of Newton's steps nearer to an equilibrium, from those with a known

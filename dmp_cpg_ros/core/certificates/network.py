@@ -137,8 +137,10 @@ class NetworkAnalysis:
 
     @cached_property
     def rest_at_speed(self) -> InhibitedEquilibrium | None:
-        """Equilibrium at the highest cadence."""
-        return inhibited_equilibrium(self.system, self.span.omega[1], self.capture.gains)
+        """Equilibrium at the highest cadence, which grows out of that at zero reference."""
+        at_rest, fastest = self.span.omega_at_rest, self.span.omega[1]
+        return None if self.rest is None else inhibited_equilibrium(
+            self.system, fastest, self.capture.gains, self.rest.state, at_rest / fastest)
 
 
 def free_synchronisation(network: GaitNetwork) -> Synchronisation:

@@ -275,14 +275,14 @@ def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed
     r, span, N = s.network.parameters.radius, s.span, len(capture.distance)
     alpha_r, a_b = s.parameters.reference.alpha_r, s.parameters.reference.braking
 
-    def drive(speed: float) -> tuple[float, float]:
+    def drive(speed: Array) -> tuple[Array, Array]:
         """|∂f/∂ω| |ω̇| and |∂f/∂ω| |ω − ω_rest|: sideways and turning count twice in the speed
         that sets the cadence.
         """
-        return (span.omega_slope * max(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r,
+        return (span.omega_slope * np.maximum(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r,
                 span.omega_slope * speed * r)
 
-    turning, away = drive(speed)
+    turning, away = map(float, drive(np.array(speed)))
     of = _falling(s, capture, turning, away) if step is None else _falling_in_steps(
         s, capture, step)
     fade, cells = math.exp(-alpha_r * of.cell), int(_HORIZON / of.cell)
@@ -292,16 +292,12 @@ def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed
     carried, fed = _in_a_block(of)
     bounds, activity = of.start, np.ones(N)
     for begin in range(0, cells, _BLOCK):
-        speeds, driven = [], []
+        falling = list[float]()
         for _ in range(_BLOCK):
-            speeds.append(speed)
-            driven += [turning, away]
-            if a_b > 0.0:
-                speed = max(0.0, min(speed * fade, speed - a_b * of.cell))
-                turning, away = drive(speed)
-            else:
-                speed, turning, away = speed * fade, turning * fade, away * fade
-        within = (carried @ bounds + fed @ np.array(driven)).reshape(_BLOCK + 1, -1)
+            falling.append(speed)
+            speed = max(0.0, min(speed * fade, speed - a_b * of.cell))
+        driven = np.stack(drive(speeds := np.array(falling)), axis=1)
+        within = (carried @ bounds + fed @ driven.ravel()).reshape(_BLOCK + 1, -1)
         v, e = within[:-1, -2 * N:-N], within[:-1, -N:]
         inner = np.maximum(of.inner, rest.radius - e)
         phase_rate = np.divide(v, inner, out=np.full_like(v, np.inf), where=inner > 1e-12)
@@ -309,7 +305,7 @@ def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed
         swinging = swings @ np.concatenate([activity[None], wanted])
         resting = np.flatnonzero(
             (phase_rate.max(axis=1) <= supervisor.REST_PHASE_RATE)
-            & (np.array(speeds) <= REST_SPEED)
+            & (speeds <= REST_SPEED)
             & (swinging[:-1].max(axis=1) <= supervisor.REST_ACTIVITY))
         if len(resting) > 0:
             cell = begin + int(resting[0])

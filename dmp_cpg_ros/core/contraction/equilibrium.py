@@ -20,6 +20,7 @@ from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.maths import Array
 
 _CONVERGED = 1e-11
+_ON_THE_WAY = 1e-6
 _SMALLEST_STEP = 1e-3  # of ω, on the way from zero
 _MOST_STEPS = 50
 
@@ -52,7 +53,8 @@ class InhibitedEquilibrium:
     slowest_rate: float
 
 
-def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array, gains: Array
+def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array, gains: Array,
+                          known: Array | None = None, share: float = 0.0
                           ) -> InhibitedEquilibrium | None:
     """Equilibrium that grows out of the resting targets as ω rises from zero, by Newton's method.
 
@@ -64,13 +66,17 @@ def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array, gains: 
         Angular frequencies [rad/s].
     gains : ndarray (N,)
         Inhibition gains α_i that act [1/s].
+    known : ndarray (N, 2), optional
+        Where it is at a share of ω.
+    share : float
+        That share.
 
     Returns
     -------
     InhibitedEquilibrium or None
         None when the equilibrium ceases to exist before ω is reached: the oscillators break free.
     """
-    return equilibrium_up_to(system, omega, gains)[0]
+    return equilibrium_up_to(system, omega, gains, known, share)[0]
 
 
 def stable_equilibrium_near(system: CanonicalSystem, omega: float | Array, gains: Array,
@@ -81,18 +87,21 @@ def stable_equilibrium_near(system: CanonicalSystem, omega: float | Array, gains
     return found if found is not None and found.slowest_rate > 0.0 else None
 
 
-def equilibrium_up_to(system: CanonicalSystem, omega: float | Array, gains: Array
+def equilibrium_up_to(system: CanonicalSystem, omega: float | Array, gains: Array,
+                      known: Array | None = None, share: float = 0.0
                       ) -> tuple[InhibitedEquilibrium | None, float]:
     """:func:`inhibited_equilibrium`, and the share of ω up to which it exists; 0 where there is
     none to begin with.
     """
-    x = _newton(system, system.target.copy(), 0.0 * np.asarray(omega), gains)
+    x = known if known is not None else _newton(
+        system, system.target.copy(), 0.0 * np.asarray(omega), gains)
     if x is None:
         return None, 0.0
-    share, step = 0.0, 0.5
+    step = 0.5
     for _ in range(_MOST_STEPS):
         ahead = min(1.0, share + step)
-        following = _newton(system, x, ahead * np.asarray(omega), gains)
+        following = _newton(system, x, ahead * np.asarray(omega), gains,
+                            _CONVERGED if ahead == 1.0 else _ON_THE_WAY)
         if following is not None:
             x, share, step = following, ahead, 1.5 * step
         elif step > _SMALLEST_STEP:
@@ -112,13 +121,13 @@ def _described(system: CanonicalSystem, x: Array, omega: float | Array, gains: A
         float(np.linalg.norm(system.field(x, omega, gains), axis=1).max()), -float(rates.max()))
 
 
-def _newton(system: CanonicalSystem, x: Array, omega: Array, gains: Array) -> Array | None:
+def _newton(system: CanonicalSystem, x: Array, omega: Array, gains: Array,
+            converged: float = _CONVERGED) -> Array | None:
     """Newton's iteration; None when it does not settle close to where it began."""
-    start = x
-    scale = float(np.abs(system.linear_part(gains)[0]).max()) + 1.0
+    start, limit = x, converged * (float(np.abs(system.linear_part(gains)[0]).max()) + 1.0)
     for _ in range(12):
         field = system.field(x, omega, gains)
-        if np.abs(field).max() < _CONVERGED * scale:
+        if np.abs(field).max() < limit:
             return x
         try:
             x = system.newton_step(x, omega, gains, field)
