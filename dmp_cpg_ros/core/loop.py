@@ -260,9 +260,10 @@ class WalkingLoop:
         wanted = named(values.get('gait', canon.wanted.name))
         present = self._described(self.parameters, canon.wanted)
         proposed = self._described(present.changed(values).parameters, wanted)
+        if wanted is not canon.wanted:
+            proposed.parameters.gait_choice.check_asked(wanted.name)
         walked = [named(end.name) for end in canon.gait.ends]
-        waits = proposed.refused_now(present, self.network, self.inhibition, self.x)
-        if waits:
+        if waits := proposed.refused_now(present, self.network, self.inhibition, self.x):
             return waits
         verdict = Change(present, present.settled.certificate(), proposed,
                          (*walked, canon.wanted)).verdict()

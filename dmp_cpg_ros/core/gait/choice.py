@@ -56,6 +56,13 @@ class GaitChoiceParameters(Parameters):
         if np.any(np.diff(self.auto_speeds) <= self.auto_hysteresis):
             raise ParameterError('auto_speeds must increase by more than auto_hysteresis')
 
+    def check_asked(self, gait: str) -> None:
+        """Raise ParameterError for a gait that is asked for while gaits are chosen."""
+        if self.auto_gait:
+            raise ParameterError(
+                f"gait = '{gait}' cannot be set while auto_gait chooses among "
+                f'{", ".join(self.auto_gaits)}; set auto_gait to false first')
+
 
 def limiting_gaits(parameters: GaitChoiceParameters, name: str, named: Callable[[str], Gait],
                    cadence_scale: float = 1.0) -> tuple[Gait, ...]:

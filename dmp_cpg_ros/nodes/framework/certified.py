@@ -261,10 +261,7 @@ class Certified:
         before, chose = accepted[suite.GaitParameters].gait, accepted[GaitChoiceParameters]
         if name != before:
             named(name)
-            if choice.auto_gait:
-                raise ParameterError(
-                    f"gait = '{name}' cannot be set while auto_gait chooses among "
-                    f'{", ".join(choice.auto_gaits)}; set auto_gait to false first')
+            choice.check_asked(name)
         names = [gait.name for gait in self._acting().gaits]
         names += chose.auto_gaits if chose.auto_gait else (before,)
         return tuple(map(named, names))

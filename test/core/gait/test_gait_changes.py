@@ -275,6 +275,16 @@ def test_the_gait_follows_the_speed() -> None:
     assert walker.gaits() == ['walk', 'walk>trot', 'trot', 'trot>walk', 'walk']
 
 
+def test_a_gait_that_is_chosen_cannot_be_asked_for() -> None:
+    loop = Walker('walk', limbs=False, gait_choice=GaitChoiceParameters(auto_gait=True)).loop
+    with pytest.raises(ParameterError, match='set auto_gait to false first'):
+        loop.change_gait('trot')
+    with pytest.raises(ParameterError, match='set auto_gait to false first'):
+        loop.change({'gait': 'trot', 'auto_gait': True})
+    assert not loop.change({'gait': 'trot', 'auto_gait': False}) and loop.canon.wanted.name == (
+        'trot')
+
+
 def test_a_blend_takes_the_place_of_a_gait() -> None:
     """Whoever reads phases asks both the same questions."""
     blend = GaitTransition(GAITS['trot'], GAITS['walk']).at(0.5, 0.1)
