@@ -30,7 +30,7 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 _ROUNDS = 5
 """How often the way to what is refused is halved at most."""
 
-MOST_EFFORT = 20
+MOST_EFFORT = 24
 """Most :meth:`Running.effort` of a verdict that looks for what would work, for its time to stay
 bounded: 1.5 to 2 ms each on a slow core."""
 
