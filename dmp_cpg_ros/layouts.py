@@ -33,7 +33,8 @@ CADENCE_ROW = 'cadence_scale'
 SHIFT_ROWS = tuple(f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xyz')
 CORRECTION_ROWS = ('base_x', 'base_y', 'base_yaw')
 MARGIN_ROWS = tuple(f'margin/{edge}' for edge in EDGES)
-PROGRESS_ROWS = tuple(f'progress/{what}' for what in ('x', 'y', 'behind', 'rough', 'gaps'))
+PROGRESS_ROWS = tuple(
+    f'progress/{what}' for what in ('x', 'y', 'behind', 'rough', 'gaps', 'high'))
 FELT_ROWS = tuple(f'felt/{leg}' for leg in LEGS)
 GROUND_ROWS = tuple(f'ground/{leg}' for leg in LEGS)
 MODE_ROWS = tuple(f'mode/{mode}' for mode in MODES)
@@ -43,10 +44,11 @@ POSTURE_ROWS = (
     *GROUND_ROWS, *MODE_ROWS, *MOVEMENT_ROWS)
 """Of ``posture_feedback``. A margin's position is that of the capture point to an edge of the
 support polygon [m]; those of the progress are the body's velocity [m/s], how far the leading
-feet are behind, how rough the ground is, and for what way gaps are counted on [m]. What is felt
-of a leg is 1 while its joints are, 0 while their angles are planned; of the ground, the heights of
-the feet over the plane that the body follows [m]. A mode's position is 1 while it lasts, else 0;
-a movement's is the phase of its canonical system, 0 while it does not move the legs.
+feet are behind, how rough the ground is, for what way gaps are counted on [m], and 1 while a foot
+has met what is not climbed. What is felt of a leg is 1 while its joints are, 0 while their angles
+are planned; of the ground, the heights of the feet over the plane that the body follows [m]. A
+mode's position is 1 while it lasts, else 0; a movement's is the phase of its canonical system, 0
+while it does not move the legs.
 """
 
 GAIN_ROWS = (*LEGS, 'region_radius', 'rest_phase', 'requested', 'at_rest', 'automatic',

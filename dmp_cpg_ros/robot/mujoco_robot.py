@@ -326,12 +326,15 @@ class MujocoRobot:
 
     @property
     def height_over_ground(self) -> float:
-        """Height of the base over the ground below its hips [m]."""
+        """Height of the base over the ground below its hips, or below its feet where that is
+        lower, as in front of a block that its hips are over [m].
+        """
         place, quaternion = self._base_pose[:3], self._base_pose[3:]
         if self.world.is_flat:
             return float(place[2])
         hips = place + self._hips_in_base @ _rotation(quaternion).T
-        return float(height_over_ground(self.world, place, hips))
+        feet = np.array([model_parts.foot_position(self.data, foot) for foot in self._ids.feet])
+        return max(float(height_over_ground(self.world, place, at)) for at in (hips, feet))
 
     def _state(self) -> RobotState:
         qpos, qvel, at, d = self.data.qpos, self.data.qvel, self._ids.base_qpos, self._ids.base_dof

@@ -225,7 +225,8 @@ class PostureController:
             self._margins(R_ground_base, feet, stride, under, error),
             Progress((measured[0], measured[1]), feet_behind(
                 plan.expected, beside, feet, self._footholds, stride.positions, stride.duty,
-                stride.omega), terrain.rough, terrain.gaps), felt or FELT, level)
+                stride.omega), terrain.rough, terrain.gaps, float(terrain.high >= 0)),
+            felt or FELT, level)
 
     def _stride(self, activity: Array, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
                 dt: float) -> Stride:

@@ -34,6 +34,11 @@ there, or to count on it, overturns the robot. From there on ρ grows to
 up to ``HIGHEST`` l, and fades by e^(−s/(``FADES`` l)) on a way s. On flat ground no foothold is
 that high, ρ is 0 and so are all e_i.
 
+**Barred.** A foot that meets something higher than ``CLIMBED`` l over the mean of the footholds
+has met what the robot does not climb: one foot may come up there, and the body falls off. The stop
+is requested (:mod:`~dmp_cpg_ros.core.inhibition.blocked`), and for the next ``FADES`` l feet are
+lifted for footholds only, so that none comes up in the steps that are left.
+
 **Gaps.** A foot that is to stand, touches nothing, and is lower than the median of all footholds
 by more than ``HOLLOW`` l is in a gap. For the next ``FADES`` l the body does not follow less of
 its command because of it: it would fall over the leg that does not bear, and slow feet step into
@@ -88,6 +93,11 @@ as in the stumbling reflex.
 
 HIGHEST = 0.6
 """Largest height that is remembered, in lengths of the leg."""
+
+CLIMBED = 0.5
+"""Height over the mean of the footholds at which a foot meets what is not climbed, in lengths of
+the leg; on stairs of 0.36 l, which are, feet met nothing above 0.45 l.
+"""
 
 FADES = 4.0
 """Way on which the memory fades to 1/e, in lengths of the leg: a few strides."""
@@ -144,6 +154,10 @@ class Terrain(NamedTuple):
         How far feet went down that hung at rest, not above 0 [m].
     walked : bool
         Whether a foot has left the ground; before, all stand where the robot was put.
+    barred : float
+        For how much more way an obstacle that is not climbed is counted on [m].
+    high : int
+        Place of the leg that has met one in this swing; −1: none has.
     """
 
     rough: float = 0.0
@@ -152,6 +166,8 @@ class Terrain(NamedTuple):
     place: Triple = (0.0, 0.0, 0.0)
     lowered: tuple[float, ...] = LEVEL_FEET
     walked: bool = False
+    barred: float = 0.0
+    high: int = -1
 
     @property
     def followed(self) -> float:
@@ -211,11 +227,17 @@ class Terrain(NamedTuple):
             rough = max(rough, high - low)
         even = not (anew or self.gaps) and middle - low < HOLLOW * leg_length
         tells = rough > 0.0 or (calm and even)
-        for foot, share, touch in zip(feet, swung, touches, strict=True):
+        barred = 0.0 if anew else max(0.0, self.barred - way)
+        met = -1 if self.high < 0 or not 0.0 <= swung[self.high] <= 1.0 else self.high
+        for i, (foot, share, touch) in enumerate(zip(feet, swung, touches, strict=True)):
             if tells and touch and SCUFFING[0] < share < SCUFFING[1]:
                 height = dot(normal, foot) - mean
-                if height > CLEAR_OF_GROUND * leg_length:
+                if height > CLIMBED * leg_length:
+                    barred, met = FADES * leg_length, i
+                elif height > CLEAR_OF_GROUND * leg_length and not barred:
                     rough = max(rough, height + MARGIN * leg_length)
+        if barred and not high - middle > STEP * leg_length:
+            rough = 0.0
         hangs = not anew and in_turn and (calm or self.gaps) and any(
             not (touch or 0.0 <= share <= 1.0)
             and middle - dot(normal, foot) > HOLLOW * leg_length
@@ -231,7 +253,8 @@ class Terrain(NamedTuple):
             max(last - sink * (rest and not touch), -LOWEST * leg_length)
             for last, rest, share, touch in zip(self.lowered, rests, swung, touches, strict=True))
         terrain = Terrain(
-            rough, gaps, footholds, place, lowered if any(lowered) else LEVEL_FEET, walked)
+            rough, gaps, footholds, place, lowered if any(lowered) else LEVEL_FEET, walked,
+            barred, met)
         return terrain, terrain.lowered if rough == 0.0 else tuple(
             height - mean - RAISED * rough + down - (
                 SEARCHED * leg_length if share > 1.0 and not (touch or rest) else 0.0)

@@ -13,7 +13,8 @@ is that it does not come ahead although its legs walk (:class:`Progress`).
 - **Blocked.** While it is asked to go at speed u, the body's way along the reference grows by
   ``STEP`` l again and again. Where it has not come farther than it once was while it was to go
   ``PATIENCE`` l, with u up to ``BRISK`` √(g l) counted, it is blocked: a stop is requested as the
-  service does, with its prediction and its bound.
+  service does, with its prediction and its bound; at once where a foot meets what is too high
+  (:mod:`~dmp_cpg_ros.core.balance.terrain`).
 
 It stays stopped while the same is asked: a command within 60° of the way that was blocked does not
 start the gait. The service does, a command that leads elsewhere (back, aside or a turn on the
@@ -80,12 +81,15 @@ class Progress(NamedTuple):
         Height of what its feet are to be lifted over [m]; 0 on even ground.
     gaps : float
         For what way gaps are counted on [m]; 0 where the ground has none.
+    high : float
+        1 while a foot has met what the robot does not climb, else 0.
     """
 
     velocity: Pair = (0.0, 0.0)
     behind: float = 0.0
     rough: float = 0.0
     gaps: float = 0.0
+    high: float = 0.0
 
 
 class BlockState(NamedTuple):
@@ -166,5 +170,6 @@ def block_step(state: BlockState, r: Array, wanted: float, progress: Progress | 
         far = 0.0
     most = min(1.0, max(LEAST, (PINNED - far) / (PINNED - HELD)))
     pinned = max(0.0, state.pinned + (due if far > HELD else -due))
-    blocked = asked > PATIENCE * leg_length or pinned > FIRM * leg_length
+    blocked = (asked > PATIENCE * leg_length or pinned > FIRM * leg_length
+               or progress.high > 0.0)
     return BlockState(blocked, ahead, made, asked, behind, most, pinned, comes_on)

@@ -270,14 +270,14 @@ class LegPrimitive:
         measured, target = self.kinematics.foot(feedback.joint_position), self.kinematics.foot(
             acting)
         away, offset = minus(measured, target), state.shift_in_base
-        lift, lag, progress = self.stumble_lift, self.stumble_lag, None
+        lift, progress = reflex.lift_left(
+            self.stumble_lift, path, feedback.rough, self.scale.leg_length), None
         if lift and not stands:
-            touches = feedback.foot_force > self.touch_force
-            progress = reflex.swing_progress(
-                path, path.swung(now), measured, target, touches)
+            progress = reflex.swing_progress(path, path.swung(now), measured, target,
+                                             feedback.foot_force > self.touch_force)
         stumble = reflex.stumble_step(
-            state.stumble, progress, lift if stands else activity * lift, lag, dt,
-            feedback.rough > 0.0)
+            state.stumble, progress, lift if stands else activity * lift, self.stumble_lag,
+            dt, feedback.rough > 0.0)
         if will_stand:
             drift = pair(feedback.drift_in_base)
             slipped = away[:2] if stands else (0.0, 0.0)
