@@ -100,6 +100,8 @@ def search(seed: int, seconds: float, weaken: str = '', most: int = 3, only: str
                     continue
                 counts['suites'] += 1
                 case['events'] = random_events(rng, 'voting' in case['parameters'], weaken)
+            case['parameters']['push_recovery'] = not any(
+                kind == 'push' for _, kind, _ in case['events'])  # which would begin a stop anew
             what, closest = play(description, case, weaken, counts)
             guided = sorted([*guided, (closest, case)], key=lambda one: -one[0])[:16]
             if what:

@@ -20,7 +20,7 @@ from dmp_cpg_ros.core.transformation.foot_path import FootPath
 from dmp_cpg_ros.studies.draws import Case, Judged, log_uniform
 from dmp_cpg_ros.studies.oscillator_loop import GAITS, Oscillators
 
-_FAST = {'alpha_r': 6.0, 'activity_rate': 50.0, 'auto_inhibit': False, 'push_recovery': False}
+_FAST = {'alpha_r': 6.0, 'activity_rate': 50.0, 'auto_inhibit': False}
 """Parameters with which a run is short."""
 
 _SPEED = 0.5  # of the reference while the gait runs [m/s]

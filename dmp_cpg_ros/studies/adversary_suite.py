@@ -201,8 +201,7 @@ _NUMBERS = {'coupling_gain': (8.0, 400.0), 'rho': (0.5, 20.0), 'inhibition_gain'
             'region_radius': (0.03, 1.2), 'cadence_scale': (0.7, 4.0), 'alpha_r': (0.7, 6.0),
             'capture_speed': (0.02, 2.0), 'max_speed': (0.05, 4.0), 'braking': (0.2, 6.0),
             'radius': (0.3, 3.0), 'gait_change_rate': (0.05, 0.5)}
-_DEFAULTS = {'max_lateral_speed': 0.3, 'max_turn_rate': 1.0, 'auto_inhibit': False,
-             'push_recovery': False}  # a stop that a push releases has no bound
+_DEFAULTS = {'max_lateral_speed': 0.3, 'max_turn_rate': 1.0, 'auto_inhibit': False}
 
 
 def random_change(rng: np.random.Generator, names: Sequence[str]) -> Case:

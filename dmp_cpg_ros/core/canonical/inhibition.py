@@ -32,7 +32,8 @@ class InhibitionParameters(Parameters):
         ('fl',), 'legs whose oscillators are inhibited; auto: at each stop the leg that is the '
         'first to come to its phase 0', choices=(*LEGS, AUTO))
     capture_speed: float = parameter(
-        0.1, 'reference foot speed below which inhibition is armed', 0.0, 10.0, unit='m/s')
+        0.1, 'reference foot speed below which inhibition is armed; without push_recovery never '
+        'above 0.2 sqrt(g l)', 0.0, 10.0, unit='m/s')
     start_inhibited: bool = parameter(
         True, 'whether the gait starts at rest and waits to be resumed')
     auto_inhibit: bool = parameter(

@@ -35,7 +35,7 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import UNCERTIFIED_VOTES, VOTE_SOURCES, SuiteParameters
 
 UNCERTIFIED = frozenset(
-    ('auto_inhibit', 'auto_delay', 'push_recovery', 'caution', 'step_timing', 'start_inhibited',
+    ('auto_inhibit', 'auto_delay', 'caution', 'step_timing', 'start_inhibited',
      'cmd_vel_timeout', 'allow_uncertified', 'auto_speeds', 'auto_hysteresis', *UNCERTIFIED_VOTES,
      *VOTE_SOURCES))
 """Parameters of certified nodes that no inequality depends on."""

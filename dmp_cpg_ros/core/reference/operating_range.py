@@ -18,6 +18,12 @@ from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 REST_SPEED = 0.01
 """Reference foot speed below which the reference is at rest [m/s]."""
 
+BORNE = 0.2
+"""Foot speed of a reference that a body on legs which are caught can bear, in √(g l): its capture
+point is that share of a leg ahead, where standing feet hold it (``CALM`` of
+:mod:`~dmp_cpg_ros.core.inhibition.push_recovery`).
+"""
+
 
 @dataclass(frozen=True)
 class OperatingRange:
@@ -78,9 +84,11 @@ def armed_speed(scale: BodyScale, inhibition: InhibitionParameters,
     """Largest foot speed at which a stop arms inhibition [m/s].
 
     Not above the limits of the commands, for cadences beyond them are not certified: after limits
-    were lowered the reference comes down to them first.
+    were lowered the reference comes down to them first. And where nobody steps out of a stop that
+    standing legs cannot bear, not above what they can.
     """
-    return min(inhibition.capture_speed, max(_fastest(scale, reference), REST_SPEED))
+    most = min(inhibition.capture_speed, max(_fastest(scale, reference), REST_SPEED))
+    return most if inhibition.push_recovery else min(most, scale.speed(BORNE))
 
 
 def _fastest(scale: BodyScale, reference: ReferenceParameters) -> float:

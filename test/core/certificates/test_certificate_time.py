@@ -12,6 +12,7 @@ from core_examples import TICK, network
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.gate import UNCERTIFIED
 from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.timing import time_to_places
@@ -153,6 +154,14 @@ def test_the_bound_grows_with_the_distance_to_the_speed_of_capture() -> None:
     bounds = [certificate(network(), InhibitionParameters(capture_speed=speed)).time_to_rest
               for speed in (0.05, 0.1, 0.4)]
     assert bounds[0] > bounds[1] > bounds[2]
+
+
+def test_the_bound_knows_that_legs_are_caught_later_where_nobody_steps_out_of_a_stop() -> None:
+    bounds = {(speed, steps): certificate(network(), InhibitionParameters(
+        capture_speed=speed, push_recovery=steps)).time_to_rest
+              for speed in (0.1, 0.5) for steps in (True, False)}
+    assert bounds[0.5, True] < bounds[0.5, False] < bounds[0.1, False] == bounds[0.1, True]
+    assert 'push_recovery' not in UNCERTIFIED
 
 
 @pytest.mark.parametrize('name', ['amble', 'walk', 'trot', 'bound'])

@@ -22,7 +22,7 @@ from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.studies.disturbances import Disturbance, pushes
 from dmp_cpg_ros.studies.random_commands import GAITS, course, touches_itself, trial
-from dmp_cpg_ros.studies.walking_trials import Walk, attitude, steady
+from dmp_cpg_ros.studies.walking_trials import Walk, attitude, is_there, steady
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
 SCALE = body_scale(load_description(load_suite().robot_file))
@@ -154,6 +154,12 @@ def test_a_robot_stays_up_under_random_commands_under_which_it_fell() -> None:
     outcome = trial(5, 9.0)
     assert outcome.fell == '' and not outcome.late
     assert 0.3 < outcome.granted / outcome.asked <= 1.0
+
+
+@pytest.mark.skipif(not is_there('robots/b2'), reason='the model of B2 is not installed')
+def test_a_robot_stays_up_that_may_catch_its_legs_at_any_speed_and_does_not_step() -> None:
+    """It fell 0.8 s after a stop at -1.0 m/s, in which its legs were caught within 0.05 s."""
+    assert trial(96151, 18.0, 'robots/b2', changes=True, auto_gait=True).fell == ''
 
 
 def test_a_robot_that_lies_down_and_gets_other_parameters_meanwhile_has_not_fallen() -> None:

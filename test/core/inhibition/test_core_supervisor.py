@@ -7,6 +7,8 @@ The robot only stands: nothing of the body enters the oscillators, the reference
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 import pytest
 from core_examples import GAITS
@@ -24,6 +26,7 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.inhibition.prediction import DOWN
 from dmp_cpg_ros.core.inhibition.supervisor import STATES
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.reference.operating_range import BORNE
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import swing_height
 
@@ -87,6 +90,23 @@ def test_inhibition_is_armed_only_when_the_reference_is_slow() -> None:
     armed = [tick.supervisor.armed for tick in run.ticks]
     first = armed.index(True)
     assert speed[first] <= 0.1 < speed[first - 1] and all(armed[first:])
+
+
+@pytest.mark.parametrize(('capture_speed', 'steps_out', 'most'), [
+    (8.0, False, BORNE), (8.0, True, inf), (0.1, False, BORNE)])
+def test_where_nobody_steps_out_of_a_stop_legs_are_caught_at_what_standing_ones_bear(
+        capture_speed: float, steps_out: bool, most: float) -> None:
+    run = walking(speed=0.8, inhibition=InhibitionParameters(
+        capture_speed=capture_speed, push_recovery=steps_out))
+    predicted = run.loop.request(True)
+    bound = run.loop.time_to_rest()
+    run.ticks.clear()
+    run.until('at_rest')
+    scale = run.loop.network.scale
+    armed = next(tick for tick in run.ticks if tick.supervisor.armed)
+    speed, first = scale.foot_speed(*armed.r), min(scale.speed(most), capture_speed)
+    assert speed <= first and speed > 0.9 * min(first, 0.8)
+    assert predicted == pytest.approx(run.loop.stop.measured_s, abs=1e-9) and predicted <= bound
 
 
 def test_a_start_in_the_middle_of_a_stop_walks_on() -> None:
