@@ -86,6 +86,9 @@ ROBOTS = tuple(f'robots/{name}.yaml' for name in (
     'hyqreal1', 'hyqreal2'))
 """Robots by their files; all but the first need the extra ``robots``."""
 
+RETURNS = 120_000
+"""First seed of the walks forth and back."""
+
 RESTARTED = (('amble', 0.5), ('trot', 1.0), ('trot', 2.0), ('pace', 0.5), ('bound', 0.5),
              ('pronk', 0.6))
 """Walks whose posture control begins anew."""

@@ -12,7 +12,8 @@ feedback of touchdown and the stumbling reflex. climbing: stairs without and wit
 share of one foot's step. delays: targets that arrive late. starved: those of controllers that do
 not get to run. mismatch: a robot that is not as its controllers know it.
 gaits: every ordered pair of gaits changed while moving; fast_gaits: at the highest speeds,
-forwards and backwards, of other robots too. restarts: posture control that forgets all in the
+forwards and backwards, of other robots too; returns: while they are told to go back, and stopped.
+restarts: posture control that forgets all in the
 middle of a stride, as a node that is started again. robots: other robots, with their files alone;
 those of the extra `robots` are left out where it is not installed.
 
@@ -24,7 +25,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from itertools import product
+from itertools import permutations, product
 from math import ceil, isnan, nan
 from pathlib import Path
 from typing import Any
@@ -197,6 +198,25 @@ def fast_gaits(workers: Workers, seeds: int, phases: int) -> Table:
                   'largest roll or pitch deg'), rows, results)
 
 
+def returns(workers: Workers, seeds: int, phases: int) -> Table:
+    """Every ordered pair of gaits changed while robots turn back and are stopped."""
+    files = [*filter(is_there, given.ROBOTS)]
+    pairs = list(permutations(load_gaits(), 2))
+    results = run(workers, change_trials.run_return, [
+        {'before': before, 'after': after, 'robot': file, 'seed': given.RETURNS + (
+            seed * len(given.ROBOTS) + given.ROBOTS.index(file)) * len(pairs) + k}
+        for file in files for k, (before, after) in enumerate(pairs) for seed in range(seeds)])
+    rows = []
+    for file in files:
+        of = [(case, one) for case, one in results if case['robot'] == file]
+        fallen = [f'{case["before"]} to {case["after"]}' for case, one in of if one.fell]
+        rows.append((Path(file).stem, str(len(of)), str(sum(one.chosen for _, one in of)),
+                     str(len(fallen)), ', '.join(dict.fromkeys(fallen)) or '-',
+                     _largest([one.tilt for _, one in of if not one.fell], '.0f')))
+    return Table('Gaits changed while robots are told to go back, and stopped', (
+        'robot', 'walks', 'by speed', 'fell', 'these', 'largest tilt deg'), rows, results)
+
+
 def restarts(workers: Workers, seeds: int, phases: int) -> Table:
     """Posture control that begins anew in the middle of a stride."""
     walks = run(workers, change_trials.run_restarts, [
@@ -277,8 +297,8 @@ def robots(workers: Workers, seeds: int, phases: int) -> Table:
 TABLES = {make.__name__: make for make in (
     speeds, benchmark_pushes.pushes, benchmark_pushes.timing, benchmark_pushes.manoeuvres,
     benchmark_pushes.unpushed, grounds.rough, grounds.rougher, grounds.higher, grounds.obstacles,
-    grounds.contacts, grounds.climbing, delays, starved, mismatch, gaits, fast_gaits, restarts,
-    robots)}
+    grounds.contacts, grounds.climbing, delays, starved, mismatch, gaits, fast_gaits, returns,
+    restarts, robots)}
 """What can be measured."""
 
 

@@ -1,10 +1,12 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Trials of changes while walking: of the gait, and of a posture control that begins anew."""
+"""Trials of changes while walking: of the gait, on a straight way and while the robot turns back
+and is stopped, and of a posture control that begins anew.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from math import ceil, isnan, nan
@@ -15,6 +17,8 @@ from dmp_cpg_ros.analysis.motion import tilt
 from dmp_cpg_ros.core.estimation.body_estimate import estimated_state
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
+from dmp_cpg_ros.studies.draws import log_uniform
+from dmp_cpg_ros.studies.loop_recording import suite_of
 from dmp_cpg_ros.studies.walking_trials import Walk, attitude
 from dmp_cpg_ros.suite import load_gaits
 
@@ -106,6 +110,83 @@ def _changed(run: Walk, fell: ChangeOutcome) -> ChangeOutcome:
     return replace(fell, fell=False, duration=duration, cycles=duration / period,
                    phase_error=max(errors), sway=sway,
                    in_time=bool(settled) and max(settled) < LOCKED_PHASE_ERROR)
+
+
+FORTH, BACK = (1.5, 3.0), 1.5
+"""Times for which a robot walks before it turns back, and after it is resumed [s]."""
+
+CHANGED, STOPPED, HELD = (-0.3, 1.0), (0.0, 2.0), (0.2, 2.5)
+"""When a gait changes and when it is stopped, after the robot is told to turn back, and for how
+long the stop is held [s].
+"""
+
+BORDERS = (0.15, 0.7)
+"""Dimensionless foot speeds between which the border of two gaits is drawn."""
+
+
+@dataclass(frozen=True)
+class ReturnOutcome:
+    """A walk forth and back.
+
+    Attributes
+    ----------
+    fell : str
+        What went on at the fall; empty without.
+    chosen : bool
+        Whether the gait was chosen by speed, at a border; else the change was asked for.
+    tilt : float
+        Largest tilt [deg].
+    """
+
+    fell: str
+    chosen: bool
+    tilt: float
+
+
+def run_return(before: str, after: str, seed: int, robot: str | None = None) -> ReturnOutcome:
+    """Walk in one gait as fast as may be asked for, and be told to go back as fast in another;
+    be stopped about the change, and walk on.
+
+    Half of the walks change gait by speed. Velocities sideways and turn rates are drawn, each zero
+    in half of the walks, anew on the way back.
+
+    Parameters
+    ----------
+    before, after : str
+        Names of the gaits.
+    seed : int
+        Of all that is drawn, and of start and noise.
+    robot : str, optional
+        Robot file; the suite's own without.
+    """
+    rng, p = np.random.default_rng(seed), suite_of(robot=robot).parameters.reference
+    chosen, ahead = bool(rng.integers(2)), float(rng.choice((-1.0, 1.0)))
+    (forth, back), turn = (
+        (way * p.max_speed, *(rng.integers(2, size=2) * rng.uniform(-1.0, 1.0, 2) * (
+            p.max_lateral_speed, p.max_turn_rate)).tolist()) for way in (ahead, -ahead)
+    ), float(rng.uniform(*FORTH))
+    change, stop = (turn + float(rng.uniform(*after_it)) for after_it in (CHANGED, STOPPED))
+    resume, border = stop + float(rng.uniform(*HELD)), log_uniform(rng, *BORDERS)
+    run = Walk(before, robot, seed=seed + 1, values=(
+        ('auto_gait', True), ('auto_gaits', (before, after)), ('auto_speeds', (border,)),
+        ('auto_hysteresis', 0.02)) if chosen else ())
+    loop = run.loop
+    events: list[tuple[float, Callable[[], object]]] = sorted([
+        (turn, lambda: loop.command(*back)), (stop, lambda: loop.request(True)),
+        (resume, lambda: loop.request(False)),
+        *([] if chosen else [(change, lambda: loop.change_gait(after))])],
+        key=lambda event: event[0])
+    loop.command(*forth)
+    for k in range(round((resume + BACK) / run.tick_s)):
+        while events and events[0][0] <= k * run.tick_s:
+            events.pop(0)[1]()
+        if not run.walk(run.tick_s):
+            break
+    largest = float(np.rad2deg(tilt(
+        np.array([state.base_quaternion for state in run.states])).max()))
+    return ReturnOutcome(
+        f'{k * run.tick_s - turn:.2f} s after it was told to turn back, {loop.canon.gait.name}, '
+        f'{loop.stop.state}' if run.fell() else '', chosen, largest)
 
 
 @dataclass(frozen=True)

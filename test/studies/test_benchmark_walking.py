@@ -107,6 +107,19 @@ def test_a_crossing_ends_at_the_finish_or_on_the_ground(monkeypatch: pytest.Monk
     assert not wall.crossed and wall.distance < 2.0
 
 
+@pytest.mark.parametrize(('seed', 'chosen'), [(0, True), (1, False)])
+def test_a_walk_forth_and_back_tells_what_went_on_at_its_fall(
+        monkeypatch: pytest.MonkeyPatch, seed: int, chosen: bool) -> None:
+    for name, value in (('FORTH', (0.3, 0.4)), ('BACK', 0.1), ('CHANGED', (0.0, 0.1)),
+                        ('STOPPED', (0.1, 0.2)), ('HELD', (0.1, 0.2))):
+        monkeypatch.setattr(change_trials, name, value)
+    outcome = change_trials.run_return('amble', 'trot', seed)
+    assert outcome.fell == '' and outcome.chosen == chosen and 0.0 < outcome.tilt < 20.0
+    monkeypatch.setattr(Walk, 'fell', lambda walk: walk.loop.stop.state == 'waiting')
+    fell = change_trials.run_return('amble', 'trot', seed).fell
+    assert 0.1 <= float(fell.split()[0]) < 0.22 and fell.endswith('waiting')
+
+
 def test_a_change_that_is_not_done_in_time_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     run = Walk('amble')
     assert run.reach((0.4, 0.0, 0.0))
