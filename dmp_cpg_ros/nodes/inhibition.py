@@ -219,7 +219,8 @@ class InhibitionNode(SuiteNode):
         the stamp 0. False while it is not known yet: what others know of a stop holds until then.
         """
         now_ns = time.monotonic_ns() if self.lock_step else stamp_ns  # no robot's time passes
-        if stamp_ns > 0 and not self._others.have_told(now_ns):
+        if stamp_ns > 0 and (not self._others.have_told(now_ns) or (
+                self.lock_step and self.certified.others.awaited())):
             return False
         self._adopt(stamp_ns)
         return True
@@ -228,6 +229,7 @@ class InhibitionNode(SuiteNode):
         """In lock-step, where the robot waits, take the tick that could not be taken before."""
         held, self._held = self._held, None
         if held is not None:
+            self.take_parameters()
             self.on_tick(*held)
 
     def _adopt(self, stamp_ns: int) -> None:

@@ -11,7 +11,9 @@ import signal
 import subprocess
 import sys
 import time
+from collections import deque
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -94,6 +96,7 @@ class MujocoRobotNode(DrivenRobot):
         self._fell, self._holding, self._open_until, self._waits = False, True, -1, 0
         self._faults: FaultInjector | None = None
         self._arrived: dict[str, int] = {}
+        self._told = deque[dict[str, Any]](maxlen=2)
         work = () if self._state.joint_work is None else ('joint_work',)
         self._state_publishers = {name: self.publisher(name) for name in (*work, *STATE_TOPICS)}
         self.publisher('robot_description').publish(String(data=urdf(self._file)))
@@ -208,6 +211,9 @@ class MujocoRobotNode(DrivenRobot):
             self._tell_failures(self._faults.acting)
         self._timing.published(stamp)
         self._publish_all()
+        if self.lock_step and self.parameters_of(VotingSwitch).voting:
+            self._told.append({name: deepcopy(getattr(writer, name)) for name in VOTING_TOPICS
+                               if getattr(writer, name) is not None})
         self.end_tick()
 
     def _publish_all(self) -> None:
@@ -216,6 +222,16 @@ class MujocoRobotNode(DrivenRobot):
             message = getattr(self._writer, name.strip('/'))
             if message is not None and (clock_ticks or name != '/clock'):
                 publisher.publish(message)
+
+    def _tell_again(self) -> None:
+        """Tell the last tick again, for a node that was restarted and may not have heard it; and
+        of the tick before what the inhibition reads, which may have died before its tick ended:
+        what it says acts one tick later, so that the robot had gone on.
+        """
+        if len(self._told) > 1:
+            for name, message in self._told[0].items():
+                self._state_publishers[name].publish(message)
+        self._publish_all()
 
     def _tell_failures(self, faults: Sequence[Fault]) -> None:
         """Tell what fails on purpose, and when nothing does any more."""
@@ -303,7 +319,7 @@ class MujocoRobotNode(DrivenRobot):
         """
         now = self._state.time_ns
         if now == self._reminded_ns:
-            self._publish_all()
+            self._tell_again()
         self._reminded_ns = now
 
     def _hold(self) -> None:
@@ -319,7 +335,7 @@ class MujocoRobotNode(DrivenRobot):
     def _on_advance(self, message: Clock) -> None:
         until = stamp_ns(message.clock)
         if self.lock_step and until == self._open_until:
-            self._publish_all()  # again: a node was restarted and may not have heard the last tick
+            self._tell_again()
             return
         self._open_until = max(self._open_until, until)
         if not self._holding or self._open_until < self._state.time_ns:

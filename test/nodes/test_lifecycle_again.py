@@ -33,6 +33,7 @@ from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.inhibition import InhibitionNode
 from dmp_cpg_ros.nodes.messages.inhibition import inhibition_state
 from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
 from dmp_cpg_ros.nodes.reference_filter import ReferenceFilter
 from dmp_cpg_ros.suite_table import KINDS
@@ -101,6 +102,24 @@ def test_a_robot_whose_gate_is_open_goes_on_when_it_is_activated_again(ros: Ros)
         ros.spin_until(lambda then=then: robot.health.stamp_ns > then)
         robot.trigger_deactivate()
         robot.trigger_activate()
+
+
+def test_in_lock_step_a_robot_tells_what_votes_are_cast_by_of_two_ticks_again(ros: Ros) -> None:
+    """The inhibition, whose gains act one tick later, may have died before its tick ended."""
+    robot, told = made(ros, MujocoRobotNode, gated=True, lock_step=True, voting=True), list[Any]()
+    robot.start()
+    robot._publish_state()
+    robot._step()
+    robot._publish_state()
+    for name in ('imu', 'foot_contacts', 'joint_states'):
+        robot._state_publishers[name].publish = (
+            lambda message, name=name: told.append((name, header_ns(message))))
+    again = Clock()
+    robot._open_until = 0
+    robot._on_advance(again)
+    tick = robot._tick_ns
+    assert told == [('imu', 0), ('foot_contacts', 0),
+                    ('imu', tick), ('foot_contacts', tick), ('joint_states', tick)]
 
 
 def _read(domain: int, told: Any, wanted: dict[str, int]) -> None:

@@ -27,7 +27,7 @@ from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.nodes import posture_control
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
-from dmp_cpg_ros.nodes.framework import gait_memory
+from dmp_cpg_ros.nodes.framework import gait_memory, parameter_follower
 from dmp_cpg_ros.nodes.framework.judging import Later
 from dmp_cpg_ros.nodes.framework.known_stop import BRIEF_NS, PATIENT_NS
 from dmp_cpg_ros.nodes.framework.told_stop import HEARTBEAT_NS
@@ -482,6 +482,9 @@ def test_in_lock_step_the_first_tick_of_who_comes_back_waits_for_the_memory(
     if comes:
         reference._memory._hear(GaitMemoryWriter(tuple(load_gaits())).fill(
             before.time_ns, tick.x, tick.x_dot, tick.gait, tick.r))
+        assert not sent  # nor does it know what the others have accepted
+        reference.certified.others.unheard.clear()
+        reference._memory._try_again()
     else:
         later_s = time.monotonic() + gait_memory.LOCK_STEP_S
         monkeypatch.setattr(time, 'monotonic', lambda: later_s)
@@ -490,6 +493,36 @@ def test_in_lock_step_the_first_tick_of_who_comes_back_waits_for_the_memory(
     assert bool(reference._r.any()) is comes
     reference._memory._try_again()
     assert len(sent) == 1
+
+
+def test_who_comes_back_asks_what_others_have_accepted_and_tells_what_it_has(
+        ros: Ros, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parameter_follower, 'ASK_EVERY_S', 600.0)
+    partners = Parameter('expected_nodes', value=['reference_filter', 'canonical_oscillators'])
+
+    def started(kind: Any, **values: float) -> Any:
+        node = kind(kind.KIND, context=ros.context, parameter_overrides=[
+            partners, *(Parameter(name, value=value) for name, value in values.items())])
+        node.start()
+        ros.executor.add_node(node)
+        return node
+
+    def knows(node: Any, name: str, value: float) -> bool:
+        return bool(node.get_parameter(name).value == value)
+
+    canonical = started(CanonicalOscillators, cadence_scale=0.9)
+    for alpha_r in (2.0, 2.5):
+        reference = started(ReferenceFilter, alpha_r=alpha_r)
+        unknown = 'parameters of canonical_oscillators are not known'
+        assert unknown in reference.missing()
+        ros.spin_until(lambda node=reference: knows(node, 'cadence_scale', 0.9))
+        ros.spin_until(lambda value=alpha_r: knows(canonical, 'alpha_r', value))
+        assert unknown not in reference.missing()
+        ros.executor.remove_node(reference)
+        reference.close()
+        reference.destroy_node()
+    ros.executor.remove_node(canonical)
+    canonical.destroy_node()
 
 
 def test_gains_of_before_a_clock_that_was_set_back_are_those_of_a_silent_inhibition(ros: Ros

@@ -87,6 +87,22 @@ def test_a_delayed_input_acts_one_tick_later(seed: int) -> None:
     assert [stamp for stamp, _ in fired] == [tick * TICK for tick in range(12)]
 
 
+def test_in_lock_step_who_is_told_of_ticks_before_its_first_one_passes_them_over() -> None:
+    """A restarted node is told again what some have said of the tick before; what others said of
+    it does not come any more.
+    """
+    inputs, fired = recorder(lock_step=True)
+    for name, tick in (('b', 1), ('c', 1), ('b', 2), ('c', 2), ('a', 2), ('a', 3), ('b', 3)):
+        inputs.add(name, tick * TICK, tick)
+    assert [stamp for stamp, _ in fired] == [2 * TICK]
+    inputs.add('a', 4 * TICK, 4)
+    inputs.add('b', 4 * TICK, 4)
+    inputs.add('c', 4 * TICK, 4)
+    assert [stamp for stamp, _ in fired] == [2 * TICK]
+    inputs.add('c', 3 * TICK, 3)
+    assert [stamp for stamp, _ in fired] == [2 * TICK, 3 * TICK, 4 * TICK]
+
+
 def test_in_lock_step_a_delayed_input_of_another_tick_does_not_count() -> None:
     inputs, fired = recorder(lock_step=True, delayed=('late',))
     for name in INPUTS:

@@ -233,6 +233,16 @@ def test_who_looks_now_and_then_knows_the_writer_all_the_same() -> None:
         assert not watch.admits(number // 2, number * TICK_NS, number * TICK_NS)
 
 
+def test_in_lock_step_the_last_two_ticks_may_be_told_again() -> None:
+    watch, last = WriterWatch(lambda: not watch.known, lock_step=True), KNOWN
+    assert all(watch.admits(k, k * TICK_NS, k) for k in range(1, last + 1))
+    assert not watch.admits(last + 1, (last - 2) * TICK_NS, last)
+    for k in range(1, 5):
+        assert watch.admits(last + k, (last - k % 2) * TICK_NS, last)
+    assert not watch.admits(last + 6, (last + 1) * TICK_NS, last)
+    assert watch.admits(last + 5, (last + 1) * TICK_NS, last)
+
+
 def test_in_lock_step_the_writer_does_not_keep_to_the_clock() -> None:
     draw = random.Random(3)
     watch, now = WriterWatch(lambda: not watch.known, lock_step=True), 0

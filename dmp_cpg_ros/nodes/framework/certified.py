@@ -92,6 +92,8 @@ class Certified:
     ----------
     gaits : KnownGaits
         All gaits of the node's file.
+    others : ParameterFollower
+        What the other owners have accepted.
     """
 
     def __init__(self, node: SuiteNode, acting: Callable[[], Acting], *, watches: bool = False
@@ -103,11 +105,11 @@ class Certified:
         self._held_in: dict[str, Certificate] = {}
         self._verdict: Verdict | None = None
         self._judged: tuple[Change, Verdict] | None = None
-        self._follower = ParameterFollower(node)
+        self.others = ParameterFollower(node)
 
     def end(self) -> None:
         """Stop following."""
-        self._follower.end()
+        self.others.end()
 
     # The certificate ---------------------------------------------------------------------------
 

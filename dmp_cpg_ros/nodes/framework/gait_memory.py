@@ -59,16 +59,19 @@ class GaitMemory:
 
     def awaited(self, stamp_ns: int, values: dict[str, Any]) -> bool:
         """Whether nothing is remembered yet that may be; a run's first tick has the stamp 0. In
-        lock-step the node takes the tick as soon as that is over.
+        lock-step the node takes the tick as soon as that is over, and it knows the parameters of
+        the others.
         """
-        if self._asked or self._kept or stamp_ns <= 0:
+        if self._asked or stamp_ns <= 0:
             return False
         if self._node.lock_step:
-            now_s = time.monotonic()
+            now_s, certified = time.monotonic(), self._node.certified
             self._until_s = min(self._until_s, now_s + LOCK_STEP_S)
-            self._held = (stamp_ns, values) if now_s < self._until_s else None
-            return self._held is not None
-        if not self._node.return_ns:
+            waits = (certified is not None and certified.others.awaited()) or (
+                not self._kept and now_s < self._until_s)
+            self._held = (stamp_ns, values) if waits else None
+            return waits
+        if self._kept or not self._node.return_ns:
             return False
         if self._began_ns < 0:
             self._began_ns = stamp_ns
@@ -82,6 +85,7 @@ class GaitMemory:
         """Take the tick that waits, or let it wait on."""
         held, self._held = self._held, None
         if held is not None:
+            self._node.take_parameters()
             self._node.on_tick(*held)
 
     def take(self, stamp_ns: int) -> tuple[float, Any] | None:

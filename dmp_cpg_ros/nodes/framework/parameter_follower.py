@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from functools import partial
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.msg import ParameterEvent, ParameterValue
@@ -16,7 +18,7 @@ from rclpy.task import Future
 
 from dmp_cpg_ros.core import suite_parameters as suite
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.nodes.framework.parameters import plain
+from dmp_cpg_ros.nodes.framework.parameters import NodeParameters, plain
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 
 if TYPE_CHECKING:
@@ -26,10 +28,13 @@ if TYPE_CHECKING:
 ANYBODYS = 'not believed: a stranger answers in the name of this service too'
 """Why an answer is dropped."""
 
-ASK_EVERY_S = 5.0
-"""Period of asking the owners [s]: what an event did not tell, because a node was not there yet or
-had to be started again, is known after this time.
+ASK_EVERY_S, FIRST_ASK_S = 5.0, 0.1
+"""Period of asking the owners [s], what an event did not tell is known after this time; and at
+first, until every owner that takes part has answered.
 """
+
+AWAITED_S = 2.0
+"""In lock-step, where the robot waits: how long a node waits for what owners have accepted [s]."""
 
 
 class ParameterFollower:
@@ -37,7 +42,9 @@ class ParameterFollower:
 
     What ``/parameter_events`` tells anybody can have said, so news make the node ask the owner,
     and so does time that has passed. False news, and answers that the node refuses, are counted
-    as dropped.
+    as dropped. A node that is started again begins with the parameters of its file, and does not
+    know what was accepted before, nor do others know that its own are as at the start: it asks at
+    once, is not ready before it has been told, and tells then what it has.
     """
 
     def __init__(self, node: SuiteNode) -> None:
@@ -49,17 +56,30 @@ class ParameterFollower:
         self._events = node.create_subscription(
             ParameterEvent, '/parameter_events', self._on_event, qos_profile_parameter_events,
             raw=True)
+        self._teller = node.create_publisher(
+            ParameterEvent, '/parameter_events', qos_profile_parameter_events)
         self._read = serialized_reader(ParameterEvent)
         self._askers = {owner: node.create_client(GetParameters, f'{owner}/get_parameters')
                         for owner in self._names}
         self._pending: dict[str, Future] = {}
         self._claimed: dict[str, dict[str, Any]] = {}
-        self._timer = node.create_steady_timer(ASK_EVERY_S, self._ask)
+        expected = node.parameters_of(NodeParameters).expected_nodes
+        self.unheard = {owner for owner in self._names if owner in expected}
+        self._until_s = inf
+        self._timer = node.create_steady_timer(
+            FIRST_ASK_S if self.unheard else ASK_EVERY_S, self._ask)
+
+    def awaited(self) -> bool:
+        """Whether an owner may still tell what it has accepted, for a tick that can wait."""
+        now_s = time.monotonic()
+        self._until_s = min(self._until_s, now_s + AWAITED_S)
+        return bool(self.unheard) and now_s < self._until_s
 
     def end(self) -> None:
         """Stop following."""
         self._node.destroy_timer(self._timer)
         self._node.destroy_subscription(self._events)
+        self._node.destroy_publisher(self._teller)
         for client in self._askers.values():
             self._node.destroy_client(client)
 
@@ -89,6 +109,8 @@ class ParameterFollower:
 
     def _ask(self) -> None:
         for owner, client in self._askers.items():
+            if self.unheard and owner not in self.unheard:
+                continue
             former = self._pending.pop(owner, None)
             if former is not None and not former.done():
                 client.remove_pending_request(former)
@@ -119,3 +141,17 @@ class ParameterFollower:
             self._node.drop('/parameter_events', DataError(
                 f'{dict(claimed)} is said to be changed by {owner}, which has not'),
                 self._node.strangers.publishing('/parameter_events'))
+        if owner in self.unheard:
+            self.unheard.remove(owner)
+            if not self.unheard:
+                self._heard_all()
+
+    def _heard_all(self) -> None:
+        """Tell the others what this node has, and ask less often."""
+        node, names = self._node, suite.CHANGEABLE.get(self._node.KIND, ())
+        node.destroy_timer(self._timer)
+        self._timer = node.create_steady_timer(ASK_EVERY_S, self._ask)
+        self._teller.publish(ParameterEvent(
+            stamp=node.get_clock().now().to_msg(), node=node.get_fully_qualified_name(),
+            changed_parameters=[
+                node.get_parameter(name).to_parameter_msg() for name in names]))

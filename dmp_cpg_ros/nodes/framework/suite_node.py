@@ -182,10 +182,15 @@ class SuiteNode(ConnectedNode):
         self._sets = self.parameter_changes.accepted
 
     def missing(self) -> list[str]:
-        """List connections with the expected nodes that do not stand yet; empty when all do."""
+        """List connections with the expected nodes that do not stand yet, and whose parameters
+        are not known yet; empty when nothing is missing.
+        """
         outputs = [(topic, self.readers(topic), publisher) for topic, publisher in self._outputs]
-        return missing_connections(self, self.KIND, outputs, self._inputs,
-                                   self.parameters_of(parameters.NodeParameters).expected_nodes)
+        unheard = () if self.certified is None else sorted(self.certified.others.unheard)
+        return missing_connections(
+            self, self.KIND, outputs, self._inputs,
+            self.parameters_of(parameters.NodeParameters).expected_nodes) + [
+                f'parameters of {owner} are not known' for owner in unheard]
 
     # Ticks -------------------------------------------------------------------------------------
 

@@ -214,12 +214,17 @@ class TickInputs:
         self._fire_exact()
 
     def _fire_exact(self) -> None:
-        """Lock-step: fire the oldest tick once it is complete; later ticks never overtake it."""
+        """Lock-step: fire the oldest tick once it is complete; later ticks never overtake it, but
+        for the first one of a node that was restarted, which is told of ticks before it, too.
+        """
         while self._pending:
-            stamp = min(self._pending)
-            tick, last = self._pending[stamp], self.last_ns
-            if len(tick) < len(self._inputs):
+            last, whole = self.last_ns, [at for at, tick in self._pending.items()
+                                         if len(tick) == len(self._inputs)]
+            stamp = min(whole, default=-1)
+            if not whole or (last is not None and stamp > min(self._pending)):
                 return
+            self._pending = {at: of for at, of in self._pending.items() if at >= stamp}
+            tick = self._pending[stamp]
             for name in self._delayed:
                 if last is not None and last not in self._late[name]:
                     return

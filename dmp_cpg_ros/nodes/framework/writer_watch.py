@@ -17,6 +17,7 @@ protect from mistakes and from what does not know them, DDS Security from the re
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 
 SILENT_NS = 500_000_000
 """Time without a message of the writer after which another one may take over [ns]."""
@@ -172,8 +173,9 @@ class WriterWatch:
         return now_ns - self._stranger_ns < REMEMBERED_NS
 
     def _is_repeat(self, ahead: int, passed_ns: int) -> bool:
-        return (self._lock_step and self._ticked and self._last > 0 and passed_ns == 0
-                and ahead == self._repeats + 1)
+        """Whether a message is one of the last two ticks that is told again."""
+        return (self._lock_step and self._ticked and self._last > 0
+                and -(self._tick_ns or inf) <= passed_ns <= 0 and ahead == self._repeats + 1)
 
     def _continues(self, ahead: int, passed_ns: int, now_ns: int) -> bool:
         """Whether a message can be the writer's next one, with losses before it perhaps."""
