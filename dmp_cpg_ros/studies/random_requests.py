@@ -9,8 +9,11 @@ through its lifecycle, a push or a failing component; at the end the robot is br
 to rest. Nobody may raise, leave a request without an answer or refuse it without a reason; stops
 and starts have to keep what was said of them, and the robot may not fall but of failing joints.
 
-With ``--again`` each sequence is walked twice, and every byte has to be the same. With
-``--smallest`` events are left out of a sequence that failed as long as it fails.
+With ``--again`` each sequence is walked twice, and every byte has to be the same; with
+``--beside`` the second time two of them at once, in two namespaces of a domain. With ``--kills``
+nodes, then processes of their own, are killed within, named, and started again. With
+``--real-time`` nobody waits for anybody. With ``--smallest`` events are left out of a sequence
+that failed as long as it fails.
 """
 
 from __future__ import annotations
@@ -39,8 +42,11 @@ from dmp_cpg_ros.studies.request_draws import drawn
 from dmp_cpg_ros.studies.request_player import ASKED
 from dmp_cpg_ros.studies.request_walks import Walked, walk
 
-LOOKED_AT = ('stops', 'starts', 'risen or lain', 'rests', 'walks')
+LOOKED_AT = ('stops', 'starts', 'risen or lain', 'rests', 'walks', 'deaths', 'in phase')
 """What is counted in the table."""
+
+NAMESPACES = ('left', 'right')
+"""Of two robots beside each other."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -53,6 +59,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add('--robots', nargs='+', default=['mini_quadruped'], metavar='FILE',
         help="that walk in turn (default: the suite's own)")
     add('--again', action='store_true', help='walk each twice, and compare')
+    add('--beside', action='store_true', help='walk each again beside another, and compare')
+    add('--kills', type=int, default=0, metavar='N', help='of nodes in each (default: 0)')
+    add('--real-time', action='store_true', help='walk in real time')
     add('--smallest', action='store_true', help='look for the shortest sequence that fails')
     return run_command(parser, arguments, _study)
 
@@ -60,20 +69,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _study(options: argparse.Namespace, _: RosArguments) -> int:
     results: list[dict[str, Any]] = []
     masses = {name: load_description(find_config(name, ROBOTS)).mass for name in options.robots}
+    seeds = range(options.seed, options.seed + options.runs)
+    cases = [drawn(seed, robot, masses[robot], options.kills) for seed in seeds
+             for robot in [options.robots[seed % len(options.robots)]]]
+    size = 2 if options.beside else 1
     with alone_in_domain(''):
-        for seed in range(options.seed, options.seed + options.runs):
-            robot = options.robots[seed % len(options.robots)]
-            case = drawn(seed, robot, masses[robot])
-            walked = _walked(case, options.logs and options.logs / str(seed))
-            if options.again and not walked.wrong:
-                again = _walked(case, None)
-                if again.digests != walked.digests:
-                    walked.wrong.append('another walk than the time before')
-            for text in walked.wrong:
-                print(f'{robot}, seed {seed}: {text}', flush=True)
-            if walked.wrong and options.smallest:
-                print(f'seed {seed}, smallest: {_smallest(case, walked.wrong[0])}', flush=True)
-            results.append(_result(case, walked))
+        for pair in (cases[k:k + size] for k in range(0, len(cases), size)):
+            outcomes = [_walked(case, options.logs and options.logs / str(case['seed']),
+                                options.real_time) for case in pair]
+            again = (_beside(pair) if options.beside else
+                     [_walked(case, None) for case in pair] if options.again else outcomes)
+            for case, walked, other in zip(pair, outcomes, again, strict=True):
+                if other is not walked and not walked.wrong:
+                    walked.wrong += [f'again: {text}' for text in other.wrong]
+                    if other.digests != walked.digests:
+                        walked.wrong.append('another walk than the time before')
+                for text in walked.wrong:
+                    print(f'{case["robot"]}, seed {case["seed"]}: {text}', flush=True)
+                if walked.wrong and options.smallest:
+                    least = _smallest(case, walked.wrong[0], options.real_time)
+                    print(f'seed {case["seed"]}, smallest: {least}', flush=True)
+                results.append(_result(case, walked))
             write_results(options.json, results)
     print(markdown_table(('robot', 'sequences', 'requests', 'granted', *LOOKED_AT, 'wrong'),
                          list(_rows(results))))
@@ -81,16 +97,24 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
     return int(any(result['wrong'] for result in results))
 
 
-def _walked(case: Case, logs: Path | None) -> Walked:
+def _walked(case: Case, logs: Path | None, real_time: bool = False) -> Walked:
     """Walk in a process of its own: what one has left in the graph is not the next one's."""
     with folder_of_logs(logs) as folder, get_context('spawn').Pool(1) as alone:
-        return alone.apply(walk, (case, folder))
+        return alone.apply(walk, (case, folder, '', real_time))
 
 
-def _smallest(case: Case, wrong: str) -> Case:
+def _beside(pair: Sequence[Case]) -> list[Walked]:
+    """Walk two at once, each in a namespace of the same domain."""
+    with folder_of_logs(None) as folder, get_context('spawn').Pool(len(pair)) as both:
+        return [walking.get() for walking in [
+            both.apply_async(walk, (case, folder / name, name))
+            for case, name in zip(pair, NAMESPACES, strict=False)]]
+
+
+def _smallest(case: Case, wrong: str, real_time: bool) -> Case:
     """The sequence without all that the failure does not need."""
     def fails(trial: Case) -> bool:
-        return any(_kind(text) == _kind(wrong) for text in _walked(trial, None).wrong)
+        return any(_kind(text) == _kind(wrong) for text in _walked(trial, None, real_time).wrong)
 
     return smallest(case, simpler, fails)
 

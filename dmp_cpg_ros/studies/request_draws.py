@@ -36,6 +36,12 @@ REST, SHUT_DOWN, INTERRUPT = ENDS = ('inhibit', 'shut_down', 'interrupt')
 node, in an order that is drawn, or by Ctrl-C.
 """
 
+TOGETHER = 0.3
+"""Share of kills of two nodes at once."""
+
+APART = {CANONICAL, INHIBITION}
+"""Nodes that do not die at once: each remembers the gait for the other."""
+
 FAILS = (0.02, 0.3)
 """How long a component fails [s]."""
 
@@ -55,8 +61,10 @@ GAINS = tuple(of.name for of in fields(PostureParameters) if isinstance(of.defau
 """Gains of the posture that change by a little."""
 
 
-def drawn(seed: int, robot: str, mass: float) -> Case:
-    """A sequence of events and how the suite starts; robot file, and its mass [kg]."""
+def drawn(seed: int, robot: str, mass: float, kills: int = 0) -> Case:
+    """A sequence of events and how the suite starts; robot file, its mass [kg], and how often
+    nodes are killed within, and once more in the walk at the end.
+    """
     rng = np.random.default_rng(seed)
     events, at = [list(event) for event in _before(rng)], 0.5
     while at < MOST:
@@ -65,12 +73,42 @@ def drawn(seed: int, robot: str, mass: float) -> Case:
         at += 0.0 if rng.random() < SAME_TICK else log_uniform(rng, *EVERY)
         if kind == 'inhibit' and rng.random() < QUIET:
             at += QUIET_S
-    return {
+    case = {
         'seed': seed, 'robot': robot, 'gait': str(rng.choice(GAITS)),
         'start_pose': str(rng.choice(['standing', 'lying'], p=(0.8, 0.2))),
         'control_rate': float(rng.choice([125.0, 250.0])),
         'stamped_cmd_vel': bool(rng.random() < 0.3), 'voting': bool(rng.random() < 0.3),
         'events': events, 'end': _end(rng)}
+    return _with_kills(case, kills) if kills else case
+
+
+def _with_kills(case: Case, kills: int) -> Case:
+    """The same sequence with nodes that are killed between its events, or in the tick of one; who
+    shuts down is not started again, so it ends in another way.
+    """
+    rng = np.random.default_rng((case['seed'], 9))
+    events = case['events']
+    for _ in range(kills):
+        nodes = _victims(rng)
+        # Ahead of what comes in the same tick; a node that is inactive for a moment is awaited by
+        # those who come back, and so are these by who waits for it.
+        with_events = [at for at, kind, _ in events if at > 1.0 and kind != 'cycle']
+        at = float(rng.choice(with_events) if with_events and rng.random() < 0.5
+                   else round(rng.uniform(1.0, MOST), 3))
+        cycled = any(kind == 'cycle' and of == at for of, kind, _ in events)
+        place = next((k for k, event in enumerate(events)
+                      if (event[0] > at if cycled else event[0] >= at)), len(events))
+        events.insert(place, [at, 'kill', nodes])
+    end = [INTERRUPT, True] if case['end'][0] == SHUT_DOWN else case['end']
+    return {**case, 'end': end, 'dies': _victims(rng)}
+
+
+def _victims(rng: np.random.Generator) -> list[str]:
+    """One node or two that die at once."""
+    nodes = [str(name) for name in rng.permutation([of for of in WALKING_NODES if of != ROBOT])]
+    count = 1 + (rng.random() < TOGETHER and not APART.issuperset(nodes[:2]))
+    return nodes[:count]
+
 
 
 def ending(case: Case) -> list[list[Any]]:
@@ -80,7 +118,9 @@ def ending(case: Case) -> list[list[Any]]:
     for wait, kind, value in (
             (0.0, 'votes', {}), (1.0, 'command', 'silence'), (STANDS_S, 'stand_up', True),
             *([(RECOVERS_S, 'recover', True), (STANDS_S, 'stand_up', True)] if failed else ()),
-            (0.0, 'command', {'v_x': 0.2}), (WALKS_S, 'inhibit', False),
+            (0.0, 'command', {'v_x': 0.2}),
+            *([(0.5 * WALKS_S, 'inhibit', False), (0.5 * WALKS_S, 'kill', case['dies'])]
+              if 'dies' in case else [(WALKS_S, 'inhibit', False)]),
             (RESTS_S, *case['end'])):
         end.append([round(at, 3), kind, value])
         at += wait

@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -21,12 +22,13 @@ from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.scenario.fault import Fault
-from dmp_cpg_ros.core.suite_parameters import OWNER
+from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
 from dmp_cpg_ros.nodes.framework.health import ReadinessOfOthers
 from dmp_cpg_ros.nodes.framework.requests import ask
 from dmp_cpg_ros.nodes.messages.commands import twist
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.scenario_player import PlayerError, ScenarioPlayer
+from dmp_cpg_ros.studies.process_usage import pid_of
 from dmp_cpg_ros.suite_table import RECORDER, ROBOT, WALKING_NODES
 
 ANSWERED_S, LOOK_S = 60.0, 0.02
@@ -37,8 +39,8 @@ TRANSITIONS = {
     'activate': Transition.TRANSITION_ACTIVATE, 'deactivate': Transition.TRANSITION_DEACTIVATE}
 """Transitions that a node comes back from."""
 
-ASKED = ('inhibit', *REQUESTS, 'set', 'gait', 'parameters', 'transition', 'fail')
-"""Kinds of events that are answered."""
+ASKED = ('inhibit', *REQUESTS, 'set', 'gait', 'parameters', 'transition', 'fail', 'kill')
+"""Kinds of events that are answered, and deaths."""
 
 
 class Answer(NamedTuple):
@@ -66,7 +68,7 @@ class Answer(NamedTuple):
 
 
 class RequestPlayer(ScenarioPlayer):
-    """Plays events in lock-step that may be refused, and more kinds of them than scenarios have.
+    """Plays events that may be refused, and more kinds of them than scenarios have.
 
     ``twist``
         A command (v_x, v_y, γ), numbers or none, at a stamp [s, ns] where it has one.
@@ -83,6 +85,9 @@ class RequestPlayer(ScenarioPlayer):
         Nodes, which are asked in turn to shut down; the scenario ends with that.
     ``interrupt``
         The run is interrupted, as by Ctrl-C.
+    ``kill``
+        Nodes, each a process of its own, that are killed. What a node had been asked and had not
+        answered it is asked again once it is back.
 
     Parameters
     ----------
@@ -103,6 +108,8 @@ class RequestPlayer(ScenarioPlayer):
                 (False, SetParameters, 'set_parameters'))}
         self._waiting: list[tuple[Mapping[str, Any], Callable[[str], None]]] = []
         self._returning: ReadinessOfOthers | None = None
+        self._lost = set[str]()
+        self._pending: dict[object, tuple[Collection[str], Callable[[], None]]] = {}
         self._asking: dict[str, Callable[[Any, Callable[[], None]], None]] = {
             **{name: partial(self._request, name) for name in self._callees},
             'set': self._change, 'gait': lambda name, then: self._change({'gait': name}, then),
@@ -110,7 +117,7 @@ class RequestPlayer(ScenarioPlayer):
         self._deliver |= {
             **{kind: partial(self._asked, kind) for kind in self._asking},
             'twist': self._twist, 'cycle': self._cycle, 'at_once': self._at_once,
-            'shut_down': self._shut_down,
+            'shut_down': self._shut_down, 'kill': self._kill,
             'interrupt': lambda _: signal.raise_signal(signal.SIGINT)}
         self.create_timer(1.0, self._watch, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._back_timer = self.create_timer(
@@ -130,6 +137,36 @@ class RequestPlayer(ScenarioPlayer):
     def _note(self, kind: str, value: Any, accepted: bool, text: str) -> None:
         self._answers.append(Answer(self.time_ns, kind, value, accepted, text))
 
+    def _until_answered(self, nodes: Collection[str], call: Callable[[Callable[..., None]], None],
+                        done: Callable[..., None]) -> None:
+        """Ask some nodes, and again when one of them was started again before the answer came; of
+        the answers the first one counts.
+        """
+        key = object()
+
+        def answered(*answer: Any) -> None:
+            if self._pending.pop(key, None) is not None:
+                done(*answer)
+
+        self._pending[key] = nodes, partial(call, answered)
+        call(answered)
+
+    def _ask_again(self, nodes: Collection[str]) -> None:
+        self._lost |= set(nodes)
+        if not self._lock_step:
+            self._ask_lost()
+
+    def _on_gains(self, message: Any) -> None:
+        self._ask_lost()
+        super()._on_gains(message)
+
+    def _ask_lost(self) -> None:
+        """Ask who has been started again before it answered; before its first tick it refuses."""
+        nodes, self._lost = self._lost, set[str]()
+        for asked, again in list(self._pending.values()):
+            if not nodes.isdisjoint(asked):
+                again()
+
     # Requests ------------------------------------------------------------------------------------
 
     def _asked(self, kind: str, value: Any) -> None:
@@ -147,7 +184,8 @@ class RequestPlayer(ScenarioPlayer):
             then()
 
         if client.service_is_ready():
-            ask(client, request, answered)
+            node = ROBOT if kind == 'fail' else interface(kind).publishers[0]
+            self._until_answered([node], partial(ask, client, request), answered)
         else:
             then()
 
@@ -163,12 +201,16 @@ class RequestPlayer(ScenarioPlayer):
         def go_on(refusal: str) -> None:
             self._waiting.pop(0)
             if self._waiting:
-                self._setter.set(*self._waiting[0])
+                self._set_next()
             done(refusal)
 
         self._waiting.append((values, go_on))
         if len(self._waiting) == 1:
-            self._setter.set(values, go_on)
+            self._set_next()
+
+    def _set_next(self) -> None:
+        values, done = self._waiting[0]
+        self._until_answered(CHANGEABLE, partial(self._setter.set, values), done)
 
     def _raw(self, value: Sequence[Any], then: Callable[[], None]) -> None:
         """Set parameters of a node, and wait until those who follow it know."""
@@ -191,7 +233,7 @@ class RequestPlayer(ScenarioPlayer):
             else:
                 then()
 
-        self._parameters[node, whole].call_async(request).add_done_callback(answered)
+        self._await(node, self._parameters[node, whole], request, answered)
 
     def _followed(self, known: Mapping[str, Any], refusal: str, then: Callable[[], None]) -> None:
         if refusal:
@@ -211,7 +253,13 @@ class RequestPlayer(ScenarioPlayer):
             then()
 
         request = ChangeState.Request(transition=Transition(id=number))
-        self._changers[node].call_async(request).add_done_callback(answered)
+        self._await(node, self._changers[node], request, answered)
+
+    def _await(self, node: str, client: Any, request: Any, answered: Callable[[Future], None]
+               ) -> None:
+        """Call a service of a node, also of one that is not there yet."""
+        self._until_answered(
+            [node], lambda told: client.call_async(request).add_done_callback(told), answered)
 
     # More than one, and what has no answer -------------------------------------------------------
 
@@ -270,6 +318,14 @@ class RequestPlayer(ScenarioPlayer):
         request = ChangeState.Request(transition=Transition(
             id=Transition.TRANSITION_ACTIVE_SHUTDOWN))
         self._changers[nodes[0]].call_async(request).add_done_callback(answered)
+
+    def _kill(self, nodes: Sequence[str]) -> None:
+        """Kill those that are there."""
+        for node in nodes:
+            if pid := pid_of(os.getpid(), [node]):
+                os.kill(pid, signal.SIGKILL)
+                self._note('kill', node, True, '')
+        self._delivered()
 
     def _look_after_return(self) -> None:
         """Go on once a node that was taken through its states is connected again."""

@@ -27,7 +27,9 @@ from dmp_cpg_ros.commands.fork_server import ForkServer
 from dmp_cpg_ros.commands.run_folder import resolved_parameters, write_parameters
 from dmp_cpg_ros.commands.suite_run import run_suite
 from dmp_cpg_ros.configuration import ROBOTS, find_config
+from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.modes.falls import FALLEN_HEIGHT_SHARE, FALLEN_TILT
 from dmp_cpg_ros.core.modes.requests import REQUESTS
@@ -46,7 +48,7 @@ from dmp_cpg_ros.studies.request_draws import (
 )
 from dmp_cpg_ros.studies.request_player import Answer, RequestPlayer
 from dmp_cpg_ros.suite import load_suite
-from dmp_cpg_ros.suite_table import RECORDED_WALK, RECORDER, WALKING
+from dmp_cpg_ros.suite_table import RECORDED_WALK, RECORDER, WALKING, namespace_rules
 
 STILL_S, STILL = 0.6, 0.5
 """Time after which joints of a gait that rests stand still [s], and their speed then at most
@@ -61,6 +63,14 @@ LEAST_TURN = 0.3
 
 SETTLED_S = 1.5
 """Time after a change of mode within which the body's height is not looked at [s]."""
+
+LATE_S = 0.1
+"""How late an answer may be in real time [s]."""
+
+WITHIN_CYCLES, BEFORE_S = 2.0, 0.5
+"""Cycles within which a gait is in phase again, and time before a death in which it has to have
+been [s].
+"""
 
 MARGIN = 1e-6
 """By which numbers may be beyond a limit that was computed otherwise."""
@@ -102,8 +112,11 @@ def scenario_of(case: Case) -> Scenario:
     return Scenario('requests', events[-1].at, tuple(events), {})
 
 
-def walk(case: Case, folder: Path) -> Walked:
-    """Let the suite walk a case, in lock-step and one process, and judge it."""
+def walk(case: Case, folder: Path, namespace: str = '', real_time: bool = False) -> Walked:
+    """Let the suite walk a case in a namespace, and judge it: in lock-step and one process, or,
+    where nodes are killed or in real time, with a process for each node.
+    """
+    respawn = any(kind == 'kill' for _, kind, _ in case['events'])
     robot = find_config(case['robot'], ROBOTS)
     overrides = {'robot': str(robot), 'gait': case['gait'], 'start_pose': case['start_pose'],
                  'start_mode': case['start_pose'],
@@ -114,16 +127,20 @@ def walk(case: Case, folder: Path) -> Walked:
     suite = load_suite(None, overrides)
     resolved = resolved_parameters(suite.file, overrides)
     for values in resolved.values():
-        values.update(lock_step=True, expected_nodes=list(RECORDED_WALK))
+        values.update(lock_step=not real_time, expected_nodes=list(RECORDED_WALK))
     resolved[RECORDER] = {'output': str(folder / 'bag'), 'expected_nodes': [
         kind.name for kind in WALKING], 'stamped_cmd_vel': case['stamped_cmd_vel']}
     file, walked = write_parameters(folder, resolved), Walked()
     said: list[str] = []
     try:
         with ForkServer() as server:
-            run_suite(scenario_of(case), suite.tick_ns, ['--ros-args', '--params-file', str(file)],
+            run_suite(scenario_of(case), suite.tick_ns, [
+                '--ros-args', '--params-file', str(file),
+                *(word for name, to in namespace_rules(namespace)
+                  for word in ('-r', f'{name}:={to}'))],
                       folder / 'logs', lambda at, text: said.append(f'{at:8.3f}  {text}'), server,
-                      lock_step=True, processes='composed',
+                      lock_step=not real_time, respawn=respawn,
+                      processes='each' if respawn or real_time else 'composed',
                       stamped=resolved[REFERENCE]['stamped_cmd_vel'],
                       make_player=partial(RequestPlayer, walked.answers))
     except InterruptedRunError as error:
@@ -140,9 +157,21 @@ def walk(case: Case, folder: Path) -> Walked:
     except DmpCpgError as error:
         walked.wrong.append(f'no recording: {error}')
         return walked
-    judge = Judge(case, walked, recording, load_description(robot), suite.tick_ns * 1e-9)
+    walked.wrong += _unnamed(walked, said)
+    judge = Judge(case, walked, recording, load_description(robot), suite.tick_ns * 1e-9,
+                  real_time)
     walked.wrong += judge.wrong()
     return walked
+
+
+def _unnamed(walked: Walked, said: Sequence[str]) -> Iterator[str]:
+    """Who was killed without a word of it."""
+    for node, kills in Counter(
+            answer.value for answer in walked.answers if answer.kind == 'kill').items():
+        walked.checked['deaths'] += kills
+        named = sum(f'{node} was ended by signal 9' in text for text in said)
+        if named != kills:
+            yield f'unnamed: {node} was killed {kills} times, and named {named} times'
 
 
 def _in_logs(logs: Path) -> Iterator[str]:
@@ -170,19 +199,21 @@ class Judge:
         Limits of its joints.
     tick_s : float
         Control tick [s].
+    real_time : bool
+        Whether nobody waited for anybody: stops and starts keep to their bounds only.
     """
 
     def __init__(self, case: Case, walked: Walked, recording: Recording,
-                 description: RobotDescription, tick_s: float) -> None:
+                 description: RobotDescription, tick_s: float, real_time: bool = False) -> None:
         """Find when something happened that changes what was promised."""
         self._case, self._walked, self._recording = case, walked, recording
-        self._robot, self._tick_s = description, tick_s
+        self._robot, self._tick_s, self._real_time = description, tick_s, real_time
         self._checked = walked.checked
         accepted = [answer.time_ns * 1e-9 for answer in walked.answers if answer.accepted]
         others = [at for at, kind, _ in case['events'] if kind in ('cycle', 'votes', 'at_once')]
         self._moved = [at + (value.get('for_s', 0.1) if kind == 'fail' else 0.0)
                        for at, kind, value in case['events']
-                       if kind in ('push', 'fail', 'cycle')]  # who is back has forgotten footholds
+                       if kind in ('push', 'fail', 'cycle', 'kill')]  # who is back has forgotten
         self._failing = [(at, at + value['for_s']) for at, kind, value in case['events']
                          if kind == 'fail']
         pushes = [at for at, kind, _ in case['events'] if kind in ('push', 'fail')]
@@ -200,6 +231,7 @@ class Judge:
         yield from self._promises()
         yield from self._modes_in_time()
         yield from self._motion()
+        yield from self._phases()
         yield from self._usable()
 
     def _answers(self) -> Iterator[str]:
@@ -283,7 +315,8 @@ class Judge:
             if done - at > bound + 1e-9:
                 yield (f'{"stop" if stop else "start"} at {at:.3f} s took {done - at:.3f} s, '
                        f'bound {bound:.3f} s')
-            elif abs(done - at - predicted) > 0.5 * self._tick_s + 1e-3:
+            elif (not self._real_time
+                    and abs(done - at - predicted) > 0.5 * self._tick_s + 1e-3):
                 yield (f'{"stop" if stop else "start"} at {at:.3f} s took {done - at:.3f} s, '
                        f'predicted {predicted:.3f} s')
 
@@ -298,7 +331,7 @@ class Judge:
                 continue
             self._checked['risen or lain'] += 1
             done = next((time for time, mode in self._modes if mode == word and time > at), inf)
-            if abs(done - at - predicted) > 0.01 + 2.0 * self._tick_s:
+            if abs(done - at - predicted) > 0.01 + 2.0 * self._tick_s + LATE_S * self._real_time:
                 yield (f'{answer.kind} at {at:.3f} s took {done - at:.3f} s, predicted '
                        f'{predicted:.2f} s')
 
@@ -339,6 +372,33 @@ class Judge:
                 turns, time = of.canonical.turns[turned], of.canonical.time[turned]
                 if (turns[-1] - turns[0]) / (time[-1] - time[0]) < LEAST_TURN:
                     yield f'walks from {begin:.3f} s on, and its oscillators stand still'
+
+    def _phases(self) -> Iterator[str]:
+        """Whether legs that were in phase when a node died are so again soon, and go on, where
+        nothing else came between.
+        """
+        canonical = self._recording.canonical
+        own = np.unwrap(phase(canonical.x), axis=0)
+        for node, at in ((answer.value, answer.time_ns * 1e-9)
+                         for answer in self._walked.answers if answer.kind == 'kill'):
+            before = (canonical.time > at - BEFORE_S) & (canonical.time <= at - self._tick_s)
+            walked = [word for time, word in self._states if time <= at - BEFORE_S]
+            if walked[-1:] != ['walking'] or before.sum() < 2:
+                continue
+            off = np.angle(np.exp(1j * (own - own[:, :1])))
+            usual = off[before][-1]
+            away = np.abs(np.angle(np.exp(1j * (off - usual)))).max(axis=1)
+            turned = np.ptp(own[before, 0])
+            within_s = WITHIN_CYCLES * 2.0 * np.pi * BEFORE_S / max(turned, 1e-9)
+            others = [change for change in self._changes if abs(change - at) > self._tick_s]
+            if (away[before].max() > LOCKED_PHASE_ERROR or at + within_s > self._end
+                    or any(at - BEFORE_S < change < at + within_s for change in others)):
+                continue
+            self._checked['in phase'] += 1
+            after = (canonical.time > at) & (canonical.time < at + within_s)
+            again = np.flatnonzero(after & (away <= LOCKED_PHASE_ERROR))
+            if not len(again) or np.ptp(own[after, 0]) < 0.5 * turned:
+                yield f'not in phase: {node} died at {at:.3f} s, and {within_s:.2f} s later'
 
     def _usable(self) -> Iterator[str]:
         """Whether the robot could be brought to walk at the end, and to rest where it was to."""

@@ -27,12 +27,13 @@ from dmp_cpg_ros.analysis.recording import (
     VelocitySeries,
 )
 from dmp_cpg_ros.core.scenario.scenario import Event
-from dmp_cpg_ros.studies import random_requests
+from dmp_cpg_ros.core.suite_parameters import CANONICAL, INHIBITION
+from dmp_cpg_ros.studies import random_requests, request_walks
 from dmp_cpg_ros.studies.draws import smallest
-from dmp_cpg_ros.studies.request_draws import drawn, may_lie
+from dmp_cpg_ros.studies.request_draws import drawn, ending, may_lie
 from dmp_cpg_ros.studies.request_player import ASKED, Answer
 from dmp_cpg_ros.studies.request_walks import Judge, Walked, scenario_of
-from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
+from dmp_cpg_ros.suite_table import RECORDER, ROBOT, WALKING_NODES
 
 ros_domain = ros_processes.ros_domain
 
@@ -53,6 +54,26 @@ def test_all_kinds_are_drawn_and_the_same_seed_draws_the_same() -> None:
             event.at for event in scenario.events)
         found |= {event.kind for event in scenario.events if isinstance(event, Event)}
     assert found == KINDS
+
+
+def test_nodes_are_killed_that_may_die_and_not_in_the_tick_of_a_cycle_before_it() -> None:
+    killed = set()
+    for seed in range(40):
+        usual = drawn(seed, 'robots/mini_quadruped.yaml', 12.0)
+        case = drawn(seed, usual['robot'], 12.0, kills=3)
+        assert json.dumps([event for event in case['events'] if event[1] != 'kill']) == (
+            json.dumps(usual['events']))
+        kills = [event for event in case['events'] if event[1] == 'kill']
+        assert len(kills) == 3 and case['end'][0] != 'shut_down'
+        assert case['events'] == sorted(case['events'], key=lambda event: event[0])
+        for nodes in (*(nodes for *_, nodes in kills), case['dies']):
+            killed.update(nodes)
+            assert not {CANONICAL, INHIBITION} <= set(nodes)
+        for place, (at, kind, _) in enumerate(case['events']):
+            assert kind != 'cycle' or not any(
+                time == at and of == 'kill' for time, of, _ in case['events'][:place])
+        assert ['kill', case['dies']] in [event[1:] for event in ending(case)]
+    assert killed == {*WALKING_NODES} - {ROBOT}
 
 
 def walked(**changed: Any) -> tuple[Recording, Walked]:
@@ -152,6 +173,34 @@ def test_falls_motion_and_numbers_are_found() -> None:
         assert any(found in text for text in wrong(recording=walked(**changed)[0])), found
 
 
+def test_a_gait_that_is_not_in_phase_after_a_death_is_found() -> None:
+    recording, _ = walked()
+    time, x = recording.canonical.time, recording.canonical.x
+
+    def found(canonical: CanonicalSeries) -> list[str]:
+        recording, said = walked(canonical=canonical)
+        said.answers.insert(0, Answer(round(4e9), 'kill', 'inhibition', True, ''))
+        judge = Judge(CASE, said, recording, robot(), TICK_S)
+        of_phases = [text for text in judge.wrong() if 'not in phase' in text]
+        assert said.checked['in phase'] == 1
+        return of_phases
+
+    assert not found(recording.canonical)
+    late, still = x.copy(), x.copy()
+    late[time > 4.0, 1] *= -1.0
+    still[time > 4.0] = x[time <= 4.0][-1]
+    for changed in (late, still):
+        assert found(replace(recording.canonical, x=changed))
+
+
+def test_who_is_killed_has_to_be_named() -> None:
+    said = Walked(answers=[Answer(0, 'kill', 'inhibition', True, '')])
+    named = ['   4.000  inhibition was ended by signal 9 (SIGKILL); it is started again']
+    assert not list(request_walks._unnamed(said, named))
+    assert list(request_walks._unnamed(said, [])) == [
+        'unnamed: inhibition was killed 1 times, and named 0 times']
+
+
 def test_a_robot_whose_joints_fail_may_lie() -> None:
     case = {**CASE, 'events': [[1.0, 'fail', {'component': 'joint', 'kind': 'off',
                                               'for_s': 0.1}]]}
@@ -171,6 +220,21 @@ def test_the_smallest_sequence_has_what_the_failure_needs() -> None:
 
     found = smallest(case, random_requests.simpler, fails)
     assert [value for _, _, value in found['events']] == [7, 23]
+
+
+def test_an_inhibition_that_votes_and_dies_ends_the_tick_and_keeps_what_it_says(
+        ros_domain: int, tmp_path: Path) -> None:
+    """What others have accepted before it died counts for what it says as soon as it is back."""
+    events = [[0.2, 'command', {'v_x': 0.3}], [0.2, 'inhibit', False],
+              [0.3, 'set', {'alpha_r': 1.5}], [0.9, 'kill', ['inhibition']],
+              [0.9, 'inhibit', True]]
+    case = {'seed': 1, 'robot': 'robots/mini_quadruped.yaml', 'gait': 'amble',
+            'start_pose': 'standing', 'control_rate': ros_processes.SHARED_HZ,
+            'stamped_cmd_vel': False, 'voting': True, 'events': events, 'end': ['inhibit', True],
+            'dies': ['reference_filter']}
+    result = random_requests._walked(case, tmp_path)
+    assert result.wrong == []
+    assert result.checked['deaths'] == 2 and result.checked['stops'] == 2
 
 
 def test_real_nodes_are_asked_and_answer(ros_domain: int, tmp_path: Path,
