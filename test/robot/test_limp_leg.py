@@ -72,6 +72,35 @@ def test_with_power_again_it_stands_up_when_it_is_asked_to() -> None:
     assert walk.loop.mode.mode == 'standing' and not walk.robot.fallen
 
 
+def test_a_leg_that_is_trapped_comes_free_as_the_robot_recovers() -> None:
+    """It is held with more than the little torque that a leg has which was cut off, and with less
+    than all of it; the others are not followed as long as it is not where it is to be.
+    """
+    walk, leg = copied('amble', 0.5), slice(0, 3)
+    sound, most = walk.robot._strength, 0.3 * walk.robot.description.legs[0].torque_limit
+    without_power(walk, 'fl')
+    walk.follow(0.5, 2.5)
+    dof = np.arange(walk.robot.model.nv)[walk.robot._dof][leg]
+    trap = walk.state.joint_position[leg] + (0.0, 0.6, -0.7)
+
+    def go(seconds: float) -> None:
+        for _ in range(round(1e9 * seconds / walk.robot.tick_ns)):
+            q, q_dot = walk.state.joint_position[leg], walk.state.joint_velocity[leg]
+            walk.robot.data.qfrc_applied[dof] = np.clip(60.0 * (trap - q) - q_dot, -most, most)
+            walk.tick()
+
+    go(1.5)
+    walk.robot._strength = sound
+    go(3.0)
+    assert (walk.loop.mode.mode, walk.watchdog.fallback) == ('lying', 'lie')
+    walk.loop.request_mode('stand_up')
+    go(4.5)
+    assert walk.loop.mode.mode == 'damped' and not walk.watchdog.fallback
+    walk.loop.request_mode('recover')
+    go(4.5)
+    assert walk.loop.mode.mode == 'standing' and not walk.robot.fallen
+
+
 def test_it_stays_down_without_power_whatever_it_is_asked_to() -> None:
     walk = copied('amble', 0.5)
     without_power(walk, 'fl')
