@@ -106,9 +106,11 @@ def _walked(case: Case, logs: Path | None, real_time: bool = False) -> Walked:
 def _beside(pair: Sequence[Case]) -> list[Walked]:
     """Walk two at once, each in a namespace of the same domain."""
     with folder_of_logs(None) as folder, get_context('spawn').Pool(len(pair)) as both:
-        return [walking.get() for walking in [
-            both.apply_async(walk, (case, folder / name, name))
-            for case, name in zip(pair, NAMESPACES, strict=False)]]
+        walking = []
+        for case, name in zip(pair, NAMESPACES, strict=False):
+            (folder / name).mkdir()
+            walking.append(both.apply_async(walk, (case, folder / name, f'/{name}')))
+        return [each.get() for each in walking]
 
 
 def _smallest(case: Case, wrong: str, real_time: bool) -> Case:
