@@ -90,6 +90,7 @@ def watching(ros: Ros, *acting: tuple[str, int, Inhibition], wait_ns: int = PATI
     node = InhibitionNode('inhibition', context=ros.context, parameter_overrides=[
         Parameter('lock_step', value=lock_step), *parameters])
     node.start()
+    node.certified.others.unheard.clear()  # nobody is there to tell parameters
     for who, stamp_ns, what in acting:
         node._others.hear(who, stamp_ns, what)
     tick_at(node, state, tick)
@@ -249,6 +250,7 @@ def test_a_restarted_node_tells_nothing_of_the_stop_before_it_knows_it(
         Parameter('lock_step', value=lock_step)]), []
     ros.nodes.append(node)
     node.trigger_configure()
+    node.certified.others.unheard.clear()
     node._told._state_publisher.publish = told.append  # type: ignore[method-assign]
     node.trigger_activate()
     _, state, tick = walked(300)
