@@ -234,7 +234,7 @@ def test_an_inhibition_that_votes_and_dies_ends_the_tick_and_keeps_what_it_says(
             'dies': ['reference_filter']}
     result = random_requests._walked(case, tmp_path)
     assert result.wrong == []
-    assert result.checked['deaths'] == 2 and result.checked['stops'] == 2
+    assert result.checked['deaths'] == 2 and result.checked['stops'] == 1
 
 
 def test_real_nodes_are_asked_and_answer(ros_domain: int, tmp_path: Path,
