@@ -9,10 +9,10 @@ through its lifecycle, a push or a failing component; at the end the robot is br
 to rest. Nobody may raise, leave a request without an answer or refuse it without a reason; stops
 and starts have to keep what was said of them, and the robot may not fall but of failing joints.
 
-With ``--again`` each sequence is walked twice, and every byte has to be the same; with
-``--beside`` the second time two of them at once, in two namespaces of a domain. With ``--kills``
-nodes, then processes of their own, are killed within, named, and started again. With
-``--real-time`` nobody waits for anybody. With ``--smallest`` events are left out of a sequence
+With ``--again`` each sequence is walked twice, the second time in one process, one for each block
+or one for each node, and every byte has to be the same; with ``--beside`` the second time two of
+them at once, in two namespaces of a domain. With ``--kills`` nodes, then processes of their own,
+are killed within, named, and started again. With ``--smallest`` events are left out of a sequence
 that failed as long as it fails.
 """
 
@@ -45,6 +45,9 @@ from dmp_cpg_ros.studies.request_walks import Walked, walk
 LOOKED_AT = ('stops', 'starts', 'risen or lain', 'rests', 'walks', 'deaths', 'in phase')
 """What is counted in the table."""
 
+WAYS = ('composed', 'blocks', 'each')
+"""Shares of processes in which a sequence may be walked again."""
+
 NAMESPACES = ('left', 'right')
 """Of two robots beside each other."""
 
@@ -58,10 +61,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add('--seed', type=int, default=0, help='of the first one (default: 0)')
     add('--robots', nargs='+', default=['mini_quadruped'], metavar='FILE',
         help="that walk in turn (default: the suite's own)")
-    add('--again', action='store_true', help='walk each twice, and compare')
+    add('--again', nargs='?', const=WAYS[0], choices=WAYS,
+        help='walk each twice, the second time so, and compare')
     add('--beside', action='store_true', help='walk each again beside another, and compare')
     add('--kills', type=int, default=0, metavar='N', help='of nodes in each (default: 0)')
-    add('--real-time', action='store_true', help='walk in real time')
     add('--smallest', action='store_true', help='look for the shortest sequence that fails')
     return run_command(parser, arguments, _study)
 
@@ -75,10 +78,11 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
     size = 2 if options.beside else 1
     with alone_in_domain(''):
         for pair in (cases[k:k + size] for k in range(0, len(cases), size)):
-            outcomes = [_walked(case, options.logs and options.logs / str(case['seed']),
-                                options.real_time) for case in pair]
+            outcomes = [_walked(case, options.logs and options.logs / str(case['seed']))
+                        for case in pair]
             again = (_beside(pair) if options.beside else
-                     [_walked(case, None) for case in pair] if options.again else outcomes)
+                     [_walked(case, None, options.again) for case in pair] if options.again
+                     else outcomes)
             for case, walked, other in zip(pair, outcomes, again, strict=True):
                 if other is not walked and not walked.wrong:
                     walked.wrong += [f'again: {text}' for text in other.wrong]
@@ -87,7 +91,7 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
                 for text in walked.wrong:
                     print(f'{case["robot"]}, seed {case["seed"]}: {text}', flush=True)
                 if walked.wrong and options.smallest:
-                    least = _smallest(case, walked.wrong[0], options.real_time)
+                    least = _smallest(case, walked.wrong[0])
                     print(f'seed {case["seed"]}, smallest: {least}', flush=True)
                 results.append(_result(case, walked))
             write_results(options.json, results)
@@ -97,10 +101,10 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
     return int(any(result['wrong'] for result in results))
 
 
-def _walked(case: Case, logs: Path | None, real_time: bool = False) -> Walked:
+def _walked(case: Case, logs: Path | None, processes: str = WAYS[0]) -> Walked:
     """Walk in a process of its own: what one has left in the graph is not the next one's."""
     with folder_of_logs(logs) as folder, get_context('spawn').Pool(1) as alone:
-        return alone.apply(walk, (case, folder, '', real_time))
+        return alone.apply(walk, (case, folder, '', processes))
 
 
 def _beside(pair: Sequence[Case]) -> list[Walked]:
@@ -113,10 +117,10 @@ def _beside(pair: Sequence[Case]) -> list[Walked]:
         return [each.get() for each in walking]
 
 
-def _smallest(case: Case, wrong: str, real_time: bool) -> Case:
+def _smallest(case: Case, wrong: str) -> Case:
     """The sequence without all that the failure does not need."""
     def fails(trial: Case) -> bool:
-        return any(_kind(text) == _kind(wrong) for text in _walked(trial, None, real_time).wrong)
+        return any(_kind(text) == _kind(wrong) for text in _walked(trial, None).wrong)
 
     return smallest(case, simpler, fails)
 

@@ -64,9 +64,6 @@ LEAST_TURN = 0.3
 SETTLED_S = 1.5
 """Time after a change of mode within which the body's height is not looked at [s]."""
 
-LATE_S = 0.1
-"""How late an answer may be in real time [s]."""
-
 WITHIN_CYCLES, BEFORE_S = 2.0, 0.5
 """Cycles within which a gait is in phase again, and time before a death in which it has to have
 been [s].
@@ -112,9 +109,9 @@ def scenario_of(case: Case) -> Scenario:
     return Scenario('requests', events[-1].at, tuple(events), {})
 
 
-def walk(case: Case, folder: Path, namespace: str = '', real_time: bool = False) -> Walked:
-    """Let the suite walk a case in a namespace, and judge it: in lock-step and one process, or,
-    where nodes are killed or in real time, with a process for each node.
+def walk(case: Case, folder: Path, namespace: str = '', processes: str = 'composed') -> Walked:
+    """Let the suite walk a case in lock-step, in a namespace, and judge it; each node has a
+    process of its own where some are killed.
     """
     respawn = any(kind == 'kill' for _, kind, _ in case['events'])
     robot = find_config(case['robot'], ROBOTS)
@@ -127,7 +124,7 @@ def walk(case: Case, folder: Path, namespace: str = '', real_time: bool = False)
     suite = load_suite(None, overrides)
     resolved = resolved_parameters(suite.file, overrides)
     for values in resolved.values():
-        values.update(lock_step=not real_time, expected_nodes=list(RECORDED_WALK))
+        values.update(lock_step=True, expected_nodes=list(RECORDED_WALK))
     resolved[RECORDER] = {'output': str(folder / 'bag'), 'expected_nodes': [
         kind.name for kind in WALKING], 'stamped_cmd_vel': case['stamped_cmd_vel']}
     file, walked = write_parameters(folder, resolved), Walked()
@@ -139,8 +136,8 @@ def walk(case: Case, folder: Path, namespace: str = '', real_time: bool = False)
                 *(word for name, to in namespace_rules(namespace)
                   for word in ('-r', f'{name}:={to}'))],
                       folder / 'logs', lambda at, text: said.append(f'{at:8.3f}  {text}'), server,
-                      lock_step=not real_time, respawn=respawn,
-                      processes='each' if respawn or real_time else 'composed',
+                      lock_step=True, respawn=respawn,
+                      processes='each' if respawn else processes,
                       stamped=resolved[REFERENCE]['stamped_cmd_vel'],
                       make_player=partial(RequestPlayer, walked.answers))
     except InterruptedRunError as error:
@@ -158,8 +155,7 @@ def walk(case: Case, folder: Path, namespace: str = '', real_time: bool = False)
         walked.wrong.append(f'no recording: {error}')
         return walked
     walked.wrong += _unnamed(walked, said)
-    judge = Judge(case, walked, recording, load_description(robot), suite.tick_ns * 1e-9,
-                  real_time)
+    judge = Judge(case, walked, recording, load_description(robot), suite.tick_ns * 1e-9)
     walked.wrong += judge.wrong()
     return walked
 
@@ -199,15 +195,13 @@ class Judge:
         Limits of its joints.
     tick_s : float
         Control tick [s].
-    real_time : bool
-        Whether nobody waited for anybody: stops and starts keep to their bounds only.
     """
 
     def __init__(self, case: Case, walked: Walked, recording: Recording,
-                 description: RobotDescription, tick_s: float, real_time: bool = False) -> None:
+                 description: RobotDescription, tick_s: float) -> None:
         """Find when something happened that changes what was promised."""
         self._case, self._walked, self._recording = case, walked, recording
-        self._robot, self._tick_s, self._real_time = description, tick_s, real_time
+        self._robot, self._tick_s = description, tick_s
         self._checked = walked.checked
         accepted = [answer.time_ns * 1e-9 for answer in walked.answers if answer.accepted]
         others = [at for at, kind, _ in case['events'] if kind in ('cycle', 'votes', 'at_once')]
@@ -315,8 +309,7 @@ class Judge:
             if done - at > bound + 1e-9:
                 yield (f'{"stop" if stop else "start"} at {at:.3f} s took {done - at:.3f} s, '
                        f'bound {bound:.3f} s')
-            elif (not self._real_time
-                    and abs(done - at - predicted) > 0.5 * self._tick_s + 1e-3):
+            elif abs(done - at - predicted) > 0.5 * self._tick_s + 1e-3:
                 yield (f'{"stop" if stop else "start"} at {at:.3f} s took {done - at:.3f} s, '
                        f'predicted {predicted:.3f} s')
 
@@ -331,7 +324,7 @@ class Judge:
                 continue
             self._checked['risen or lain'] += 1
             done = next((time for time, mode in self._modes if mode == word and time > at), inf)
-            if abs(done - at - predicted) > 0.01 + 2.0 * self._tick_s + LATE_S * self._real_time:
+            if abs(done - at - predicted) > 0.01 + 2.0 * self._tick_s:
                 yield (f'{answer.kind} at {at:.3f} s took {done - at:.3f} s, predicted '
                        f'{predicted:.2f} s')
 

@@ -218,13 +218,14 @@ class TickInputs:
         for the first one of a node that was restarted, which is told of ticks before it, too.
         """
         while self._pending:
-            last, whole = self.last_ns, [at for at, tick in self._pending.items()
-                                         if len(tick) == len(self._inputs)]
-            stamp = min(whole, default=-1)
-            if not whole or (last is not None and stamp > min(self._pending)):
-                return
-            self._pending = {at: of for at, of in self._pending.items() if at >= stamp}
+            last, stamp, full = self.last_ns, min(self._pending), len(self._inputs)
+            if last is None:
+                whole = [at for at, tick in self._pending.items() if len(tick) == full]
+                stamp = min(whole, default=stamp)
+                self._pending = {at: of for at, of in self._pending.items() if at >= stamp}
             tick = self._pending[stamp]
+            if len(tick) < full:
+                return
             for name in self._delayed:
                 if last is not None and last not in self._late[name]:
                     return
