@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.balance.terrain import (
     CLEAR_OF_GROUND,
+    CLIMBED,
     FADES,
     FOLLOWED,
     FORGOTTEN,
@@ -141,6 +142,27 @@ def test_swinging_foot_finds_the_first_step(calm: bool, height: float) -> None:
     met, _ = felt((height, 0.0, 0.0, 0.0), terrain, swung=(SWINGING, *(STANDING,) * 3), calm=calm)
     finds = calm and height > CLEAR_OF_GROUND * LENGTH
     assert met.rough == pytest.approx(height + MARGIN * LENGTH if finds else 0.0)
+
+
+@pytest.mark.parametrize('calm', [False, True])
+@pytest.mark.parametrize('height', [CLIMBED * 0.9, CLIMBED * 1.5])
+def test_what_a_foot_meets_too_high_is_not_climbed(calm: bool, height: float) -> None:
+    terrain, up = lifted(felt((0.0,) * 4)[0]), height * LENGTH
+    swings = (SWINGING, *(STANDING,) * 3)
+    met, _ = felt((up, 0.0, 0.0, 0.0), terrain, swung=swings, calm=calm)
+    low, _ = felt((up / 4.0, 0.0, 0.0, 0.0), met, swung=swings)
+    if not (calm and height > CLIMBED):
+        assert met.high == -1 and met.barred == 0.0 and (met.rough > 0.0) == calm
+        assert low.rough > 0.0
+        return
+    assert met.high == 0 and met.rough == 0.0 and met.barred == FADES * LENGTH
+    assert low.rough == 0.0 and low.high == 0                     # until the foot has come down
+    down, _ = felt((0.0,) * 4, low, x=0.02, swung=(1.1, *(STANDING,) * 3))
+    assert down.high == -1 and down.barred == pytest.approx(FADES * LENGTH - 0.02)
+    on_top, _ = felt((up, 0.0, 0.0, 0.0), low)                     # where it may have come up
+    assert on_top.rough > 0.0
+    away, _ = felt((0.0,) * 4, down._replace(barred=0.01), x=0.04)
+    assert away.barred == 0.0
 
 
 @pytest.mark.parametrize('free', [False, True])

@@ -216,6 +216,33 @@ def test_feet_on_their_way_are_not_behind_and_held_ones_are_as_far_as_they_are(
             0.05 * stands, abs=1e-12)
 
 
+def test_what_is_too_high_blocks_at_once() -> None:
+    r, going = np.array((0.5, 0.0, 0.0)), Progress((0.5, 0.0))
+    assert not block_step(NO_BLOCK, r, 0.5, going, LENGTH, TICK).acts
+    assert block_step(NO_BLOCK, r, 0.5, going._replace(high=1.0), LENGTH, TICK).acts
+    assert not block_step(NO_BLOCK, 0.0 * r, 0.0, going._replace(high=1.0), LENGTH, TICK).acts
+
+
+@pytest.mark.parametrize(('gait', 'height'), [('amble', 0.2), ('trot', 0.2), ('amble', 0.18)])
+def test_before_a_step_that_it_does_not_climb_it_stands(gait: str, height: float) -> None:
+    """One forefoot used to come up there, and the body fell off."""
+    run = Walk(gait, None, Steps(height=height, platform=4.0), 7)
+    run.loop.command(0.5)
+    while not run.loop.stop.block.acts:
+        assert run.walk(TICK) and run.state.time_ns < 8e9
+    predicted, begin = ahead(run.loop), run.state.time_ns
+    while run.loop.stop.state != 'at_rest':
+        assert run.walk(TICK)
+    assert 1e-9 * (run.state.time_ns - begin) == pytest.approx(predicted, abs=1e-9)
+    assert run.walk(1.0)
+    heights = [foot[2] for foot in run.loop.posture.balance.terrain.footholds]
+    assert max(heights) - min(heights) < 0.5 * height                # none is up there
+    place = run.state.base_position_in_world[0]
+    run.loop.command(-0.3)
+    assert run.walk(3.0)
+    assert place - run.state.base_position_in_world[0] > 0.3
+
+
 def test_before_a_block_it_stands_and_walks_away() -> None:
     run = Walk('trot', None, Steps(height=0.25, platform=4.0), 5)
     run.loop.command(0.5)

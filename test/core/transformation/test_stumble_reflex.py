@@ -15,11 +15,15 @@ from dmp_cpg_ros.core.transformation.leg import LegFeedback, LegParameters, LegP
 from dmp_cpg_ros.core.transformation.stumble import (
     GENTLENESS,
     HIGHEST,
+    HIGHEST_SWING,
     LATENCY,
+    LEAST_LIFT,
     POST_STUMBLE_SWINGS,
     Stumble,
     compliant_offset_rate,
+    lift_left,
     stumble_step,
+    swing_clearance,
     swing_progress,
 )
 from dmp_cpg_ros.robot.model_reader import load_description
@@ -218,3 +222,18 @@ def landing_tick(force: float) -> int:
 def test_the_leg_takes_the_force_of_its_foot_for_a_touch() -> None:
     touch = leg_and_state(0.13)[0].touch_force
     assert landing_tick(1.1 * touch) < landing_tick(0.0) == landing_tick(0.9 * touch) < 500
+
+
+@pytest.mark.parametrize('rough', [0.0, 0.02, 0.1, 0.5])
+def test_over_rough_ground_a_swing_is_no_higher_than_the_highest(rough: float) -> None:
+    leg, state = leg_and_state(0.13)
+    length, tripped = leg.scale.leg_length, state.stumble._replace(lifts=HIGHEST)
+    height = swing_clearance(leg.clearance, leg.stumble_lift, tripped, rough, length)
+    path = FootPath((0.2, 0.1, -0.3), 0.5, 0.0, 0.0, 6.0, 0.7, height)
+    left = lift_left(leg.stumble_lift, path, rough, length)
+    if not rough:
+        assert height == leg.clearance + HIGHEST * leg.stumble_lift and left == leg.stumble_lift
+        return
+    assert height <= HIGHEST_SWING * length
+    assert LEAST_LIFT * leg.stumble_lift <= left <= leg.stumble_lift
+    assert height + left <= HIGHEST_SWING * length + LEAST_LIFT * leg.stumble_lift
