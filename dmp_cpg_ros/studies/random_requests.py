@@ -38,7 +38,7 @@ from dmp_cpg_ros.studies.output import (
     parser_of,
     write_results,
 )
-from dmp_cpg_ros.studies.request_draws import drawn
+from dmp_cpg_ros.studies.request_draws import REST, drawn
 from dmp_cpg_ros.studies.request_player import ASKED
 from dmp_cpg_ros.studies.request_walks import Walked, walk
 
@@ -75,6 +75,9 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
     seeds = range(options.seed, options.seed + options.runs)
     cases = [drawn(seed, robot, masses[robot], options.kills) for seed in seeds
              for robot in [options.robots[seed % len(options.robots)]]]
+    if options.again in WAYS[1:]:  # several processes do not end at one tick
+        for case in cases:
+            case['end'] = [REST, True]
     size = 2 if options.beside else 1
     with alone_in_domain(''):
         for pair in (cases[k:k + size] for k in range(0, len(cases), size)):
