@@ -19,6 +19,7 @@ from zipfile import ZipFile
 
 import pytest
 from checkout import PACKAGE, ROOT, imports, modules, setup_argument, setup_constant
+from ros_processes import reserved_domain
 
 import dmp_cpg_ros
 from dmp_cpg_ros.__main__ import ON_THE_INDEX
@@ -251,10 +252,12 @@ def test_a_sourced_ros_of_another_python_is_named_in_one_line(
     ('mcap', ('analyze', 'no_such_run'))])
 def test_a_requirement_that_is_missing_is_named_in_one_line(
         missing: str, words: tuple[str, ...]) -> None:
-    process = subprocess.run(
-        [sys.executable, '-c', f'import sys; sys.modules[{missing!r}] = None; '
-         f'from dmp_cpg_ros.__main__ import main; sys.exit(main({list(words)}))'],
-        capture_output=True, text=True, check=False, timeout=120)
+    with reserved_domain() as domain:
+        process = subprocess.run(
+            [sys.executable, '-c', f'import sys; sys.modules[{missing!r}] = None; '
+             f'from dmp_cpg_ros.__main__ import main; sys.exit(main({list(words)}))'],
+            capture_output=True, text=True, check=False, timeout=120,
+            env={**os.environ, 'ROS_DOMAIN_ID': str(domain)})
     assert process.returncode == 2, process.stderr
     assert process.stderr.count('\n') == 1, process.stderr
     assert f'pip install {ON_THE_INDEX[missing]}\n' in process.stderr

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import yaml
 from checkout import ROOT
+from ros_processes import reserved_domain
 
 from dmp_cpg_ros.commands.walk import load_scenario, main
 from dmp_cpg_ros.configuration import find_config
@@ -123,7 +124,9 @@ def test_aliases_that_stand_for_billions_of_values_are_refused(kind: str, tmp_pa
 
 @pytest.mark.parametrize('value', ['*a', '[' * 1000, '\x00', '!!binary x', '{a: [}', '9' * 5000])
 def test_values_on_the_command_line_are_read_as_strictly(
-        value: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(['--set', f'gait:={value}']) == 2
+        value: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    with reserved_domain() as domain:
+        monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+        assert main(['--set', f'gait:={value}']) == 2
     told = capsys.readouterr().err.splitlines()
     assert len(told) == 1 and "'gait', line 1" in told[0]

@@ -226,7 +226,9 @@ def test_stop_and_start_keep_bound_and_prediction_under_random_contacts(
 
 
 def test_legs_keep_their_places_while_a_gait_changes_under_random_contacts() -> None:
-    suite, random = suite_with(gait='amble', contact_gain=300.0), np.random.default_rng(5)
+    # What swinging feet meet at random feigns steps.
+    suite = suite_with(gait='amble', contact_gain=300.0, climbing=False)
+    random = np.random.default_rng(5)
     robot = PerfectTrackingRobot(load_description(suite.robot_file), suite.tick_ns)
     loop = WalkingLoop(robot.description, load_gait('amble'), suite.parameters, load_gaits())
     state, force = robot.reset(), np.zeros(4)
