@@ -36,7 +36,9 @@ up to ``HIGHEST`` l, and fades by e^(−s/(``FADES`` l)) on a way s. On flat gro
 that high, ρ is 0 and so are all e_i.
 
 **Barred.** A foot that meets something higher than ``CLIMBED`` l over the mean of the footholds
-has met what the robot does not climb: one foot may come up there, and the body falls off. The stop
+has met what the robot does not climb: one foot may come up there, and the body falls off. A sensor
+that tells anything feigns that; one that has changed its mind more than ``FLICKERS`` times in a
+swing is not believed. The stop
 is requested (:mod:`~dmp_cpg_ros.core.inhibition.blocked`), and for the next ``FADES`` l feet are
 lifted for footholds only, so that none comes up in the steps that are left.
 
@@ -100,6 +102,9 @@ CLIMBED = 0.5
 the leg; on stairs of 0.36 l, which are, feet met nothing above 0.45 l.
 """
 
+FLICKERS = 6
+"""How often a contact sensor may change its mind in a swing of which it is to tell that."""
+
 FADES = 4.0
 """Way on which the memory fades to 1/e, in lengths of the leg: a few strides."""
 
@@ -161,6 +166,10 @@ class Terrain(NamedTuple):
         Place of the leg that has met one in this swing; −1: none has.
     lifted : tuple of four bool
         Which feet have been free in the swing that they are in.
+    touched : tuple of four bool
+        Which feet touched something at the last tick.
+    changes : tuple of four int
+        How often that has changed in the swing that a foot is in.
     """
 
     rough: float = 0.0
@@ -172,6 +181,8 @@ class Terrain(NamedTuple):
     barred: float = 0.0
     high: int = -1
     lifted: tuple[bool, ...] = (False,) * 4
+    touched: tuple[bool, ...] = (False,) * 4
+    changes: tuple[int, ...] = (0,) * 4
 
     @property
     def followed(self) -> float:
@@ -236,11 +247,15 @@ class Terrain(NamedTuple):
         lifted = tuple(
             0.0 <= share <= 1.0 and (before or not touch)
             for before, share, touch in zip(self.lifted, swung, touches, strict=True))
+        changes = tuple(
+            before + (touch != last) if 0.0 <= share <= 1.0 else 0 for before, last, share, touch
+            in zip(self.changes, self.touched, swung, touches, strict=True))
         for i, (foot, share, touch) in enumerate(zip(feet, swung, touches, strict=True)):
             if tells and touch and lifted[i] and SCUFFING[0] < share < SCUFFING[1]:
                 height = dot(normal, foot) - mean
                 if height > CLIMBED * leg_length:
-                    barred, met = FADES * leg_length, i
+                    if changes[i] <= FLICKERS:
+                        barred, met = FADES * leg_length, i
                 elif height > CLEAR_OF_GROUND * leg_length and not barred:
                     rough = max(rough, height + MARGIN * leg_length)
         if barred and not high - middle > STEP * leg_length:
@@ -261,7 +276,7 @@ class Terrain(NamedTuple):
             for last, rest, share, touch in zip(self.lowered, rests, swung, touches, strict=True))
         terrain = Terrain(
             rough, gaps, footholds, place, lowered if any(lowered) else LEVEL_FEET, walked,
-            barred, met, lifted)
+            barred, met, lifted, tuple(touches), changes)
         return terrain, terrain.lowered if rough == 0.0 else tuple(
             height - mean - RAISED * rough + down - (
                 SEARCHED * leg_length if share > 1.0 and not (touch or rest) else 0.0)

@@ -17,6 +17,7 @@ from dmp_cpg_ros.core.balance.terrain import (
     CLEAR_OF_GROUND,
     CLIMBED,
     FADES,
+    FLICKERS,
     FOLLOWED,
     FORGOTTEN,
     HIGHEST,
@@ -145,23 +146,26 @@ def test_swinging_foot_finds_the_first_step(calm: bool, height: float) -> None:
 
 
 @pytest.mark.parametrize('calm', [False, True])
+@pytest.mark.parametrize('flickers', [1, FLICKERS + 1])
 @pytest.mark.parametrize('height', [CLIMBED * 0.9, CLIMBED * 1.5])
-def test_what_a_foot_meets_too_high_is_not_climbed(calm: bool, height: float) -> None:
-    terrain, up = lifted(felt((0.0,) * 4)[0]), height * LENGTH
-    swings = (SWINGING, *(STANDING,) * 3)
-    met, _ = felt((up, 0.0, 0.0, 0.0), terrain, swung=swings, calm=calm)
-    low, _ = felt((up / 4.0, 0.0, 0.0, 0.0), met, swung=swings)
-    if not (calm and height > CLIMBED):
-        assert met.high == -1 and met.barred == 0.0 and (met.rough > 0.0) == calm
-        assert low.rough > 0.0
+def test_what_a_foot_meets_too_high_is_not_climbed(
+        calm: bool, flickers: int, height: float) -> None:
+    up, swings = height * LENGTH, (SWINGING, *(STANDING,) * 3)
+    terrain = lifted(felt((0.0,) * 4)[0])._replace(changes=(flickers - 1, 0, 0, 0),
+                                                   touched=(False, True, True, True))
+    met, _ = felt((up, 0.0, 0.0, 0.0), terrain, x=0.01, swung=swings, calm=calm)
+    low, _ = felt((up / 4.0, 0.0, 0.0, 0.0), met, x=0.01, swung=swings)
+    if not (calm and flickers <= FLICKERS and height > CLIMBED):
+        assert met.high == -1 and met.barred == 0.0
+        assert (met.rough > 0.0) == (calm and height < CLIMBED)
         return
     assert met.high == 0 and met.rough == 0.0 and met.barred == FADES * LENGTH
     assert low.rough == 0.0 and low.high == 0                     # until the foot has come down
-    down, _ = felt((0.0,) * 4, low, x=0.02, swung=(1.1, *(STANDING,) * 3))
+    down, _ = felt((0.0,) * 4, low, x=0.03, swung=(1.1, *(STANDING,) * 3))
     assert down.high == -1 and down.barred == pytest.approx(FADES * LENGTH - 0.02)
-    on_top, _ = felt((up, 0.0, 0.0, 0.0), low)                     # where it may have come up
+    on_top, _ = felt((up, 0.0, 0.0, 0.0), low, x=0.01)             # where it may have come up
     assert on_top.rough > 0.0
-    away, _ = felt((0.0,) * 4, down._replace(barred=0.01), x=0.04)
+    away, _ = felt((0.0,) * 4, down._replace(barred=0.01), x=0.06)
     assert away.barred == 0.0
 
 
