@@ -223,10 +223,10 @@ def test_what_is_too_high_blocks_at_once() -> None:
     assert not block_step(NO_BLOCK, 0.0 * r, 0.0, going._replace(high=1.0), LENGTH, TICK).acts
 
 
-@pytest.mark.parametrize(('gait', 'height'), [('amble', 0.2), ('trot', 0.2), ('amble', 0.18)])
-def test_before_a_step_that_it_does_not_climb_it_stands(gait: str, height: float) -> None:
+@pytest.mark.parametrize('gait', ['amble', 'trot'])
+def test_before_a_step_that_it_does_not_climb_it_stands(gait: str) -> None:
     """One forefoot used to come up there, and the body fell off."""
-    run = Walk(gait, None, Steps(height=height, platform=4.0), 7)
+    run = Walk(gait, None, Steps(height=0.2, platform=4.0), 7)
     run.loop.command(0.5)
     while not run.loop.stop.block.acts:
         assert run.walk(TICK) and run.state.time_ns < 8e9
@@ -236,7 +236,7 @@ def test_before_a_step_that_it_does_not_climb_it_stands(gait: str, height: float
     assert 1e-9 * (run.state.time_ns - begin) == pytest.approx(predicted, abs=1e-9)
     assert run.walk(1.0)
     heights = [foot[2] for foot in run.loop.posture.balance.terrain.footholds]
-    assert max(heights) - min(heights) < 0.5 * height                # none is up there
+    assert max(heights) - min(heights) < 0.1                         # none is up there
     place = run.state.base_position_in_world[0]
     run.loop.command(-0.3)
     assert run.walk(3.0)
