@@ -110,7 +110,6 @@ def _victims(rng: np.random.Generator) -> list[str]:
     return nodes[:count]
 
 
-
 def ending(case: Case) -> list[list[Any]]:
     """Events by which a robot is brought to walk, whatever was before, and to its end."""
     at = max([event[0] for event in case['events']], default=0.0) + 0.5

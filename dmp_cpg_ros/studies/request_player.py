@@ -68,7 +68,7 @@ class Answer(NamedTuple):
 
 
 class RequestPlayer(ScenarioPlayer):
-    """Plays events that may be refused, and more kinds of them than scenarios have.
+    """Plays events in lock-step that may be refused, and more kinds of them than scenarios have.
 
     ``twist``
         A command (v_x, v_y, γ), numbers or none, at a stamp [s, ns] where it has one.
@@ -153,8 +153,6 @@ class RequestPlayer(ScenarioPlayer):
 
     def _ask_again(self, nodes: Collection[str]) -> None:
         self._lost |= set(nodes)
-        if not self._lock_step:
-            self._ask_lost()
 
     def _on_gains(self, message: Any) -> None:
         self._ask_lost()

@@ -38,9 +38,9 @@ that high, ρ is 0 and so are all e_i.
 **Barred.** A foot that meets something higher than ``CLIMBED`` l over the mean of the footholds
 has met what the robot does not climb: one foot may come up there, and the body falls off. A sensor
 that tells anything feigns that; one that has changed its mind more than ``FLICKERS`` times in a
-swing is not believed. The stop
-is requested (:mod:`~dmp_cpg_ros.core.inhibition.blocked`), and for the next ``FADES`` l feet are
-lifted for footholds only, so that none comes up in the steps that are left.
+swing is not believed. The stop is requested (:mod:`~dmp_cpg_ros.core.inhibition.blocked`), and for
+the next ``FADES`` l feet are lifted for footholds only, so that none comes up in the steps that
+are left.
 
 **Gaps.** A foot that is to stand, touches nothing, and is lower than the median of all footholds
 by more than ``HOLLOW`` l is in a gap. For the next ``FADES`` l the body does not follow less of
@@ -244,12 +244,7 @@ class Terrain(NamedTuple):
         tells = rough > 0.0 or (calm and even)
         barred = 0.0 if anew else max(0.0, self.barred - way)
         met = -1 if self.high < 0 or not 0.0 <= swung[self.high] <= 1.0 else self.high
-        lifted = tuple(
-            0.0 <= share <= 1.0 and (before or not touch)
-            for before, share, touch in zip(self.lifted, swung, touches, strict=True))
-        changes = tuple(
-            before + (touch != last) if 0.0 <= share <= 1.0 else 0 for before, last, share, touch
-            in zip(self.changes, self.touched, swung, touches, strict=True))
+        lifted, changes = self._in_swings(swung, touches)
         for i, (foot, share, touch) in enumerate(zip(feet, swung, touches, strict=True)):
             if tells and touch and lifted[i] and SCUFFING[0] < share < SCUFFING[1]:
                 height = dot(normal, foot) - mean
@@ -282,6 +277,18 @@ class Terrain(NamedTuple):
                 SEARCHED * leg_length if share > 1.0 and not (touch or rest) else 0.0)
             for height, down, rest, share, touch in zip(
                 heights, lowered, rests, swung, touches, strict=True))
+
+    def _in_swings(self, swung: Sequence[float], touches: Sequence[bool]
+                   ) -> tuple[tuple[bool, ...], tuple[int, ...]]:
+        """Which feet have been free in the swing that they are in, and how often their sensors
+        have changed their mind in it.
+        """
+        swinging = [0.0 <= share <= 1.0 for share in swung]
+        return tuple(
+            swings and (before or not touch)
+            for before, swings, touch in zip(self.lifted, swinging, touches, strict=True)), tuple(
+            before + (touch != last) if swings else 0 for before, last, swings, touch
+            in zip(self.changes, self.touched, swinging, touches, strict=True))
 
 
 def contacts(state: RobotState, forces: Array, rests: Sequence[bool],

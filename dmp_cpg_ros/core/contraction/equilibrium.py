@@ -20,7 +20,7 @@ from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.maths import Array
 
 _CONVERGED = 1e-11
-_ON_THE_WAY = 1e-6
+_ON_THE_WAY = 1e-6  # between zero and ω, where Newton's method only begins anew
 _SMALLEST_STEP = 1e-3  # of ω, on the way from zero
 _MOST_STEPS = 50
 
