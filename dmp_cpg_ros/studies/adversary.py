@@ -29,7 +29,8 @@ from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.files import readable
 from dmp_cpg_ros.studies import adversary_networks, adversary_rows
-from dmp_cpg_ros.studies.adversary_suite import play, random_events, setting, smaller, varied
+from dmp_cpg_ros.studies.adversary_draws import random_events, setting, varied
+from dmp_cpg_ros.studies.adversary_suite import play, smaller
 from dmp_cpg_ros.studies.draws import Case, smallest
 from dmp_cpg_ros.studies.oscillator_loop import CONDITIONS, Oscillators
 from dmp_cpg_ros.studies.workers import Workers
@@ -99,7 +100,7 @@ def search(seed: int, seconds: float, weaken: str = '', most: int = 3, only: str
                 if not _is_certified(description, case):
                     continue
                 counts['suites'] += 1
-                case['events'] = random_events(rng, 'voting' in case['parameters'], weaken)
+                case['events'] = random_events(rng, case, weaken)
             case['parameters']['push_recovery'] = not any(
                 kind == 'push' for _, kind, _ in case['events'])  # which would begin a stop anew
             what, closest = play(description, case, weaken, counts)

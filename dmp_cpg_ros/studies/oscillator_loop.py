@@ -16,6 +16,7 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.gait.choice import changing_to
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.inhibition.handover import adopted
@@ -39,16 +40,24 @@ inhibition is armed at once and switches each leg by its own region, and without
 GAITS = load_gaits()
 
 
+def gaits_of(case: Case) -> dict[str, Gait]:
+    """Gaits that may be walked in a case: its own, ``gaits`` as entries of a file of them, and
+    those of the package.
+    """
+    return GAITS | {name: Gait.from_mapping(name, entry)
+                    for name, entry in case.get('gaits', {}).items()}
+
+
 class Oscillators(WalkingLoop):
     """The loop's reference, oscillators, votes and state of the stop, without robot and legs."""
 
     def __init__(self, description: RobotDescription, case: Case, weaken: str = '') -> None:
         """Build the loop of a case."""
-        self.tick_ns = round(case['tick_s'] * 1e9)
+        self.tick_ns, gaits = round(case['tick_s'] * 1e9), gaits_of(case)
         start = Running(SuiteParameters(reference=ReferenceParameters(cmd_vel_timeout=0.0)),
-                        GAITS[case['gait']], None, case['tick_s'])  # type: ignore[arg-type]
-        super().__init__(description, GAITS[case['gait']],
-                         start.changed(case['parameters']).parameters, GAITS)
+                        gaits[case['gait']], None, case['tick_s'])  # type: ignore[arg-type]
+        super().__init__(description, gaits[case['gait']],
+                         start.changed(case['parameters']).parameters, gaits)
         self._dt, self._weaken, self.now_ns = case['tick_s'], weaken, 0
         self._margins, self._pushed_until_ns = (np.inf,) * 4, 0
         self._voted_ns, self._lead_ns = -1, round(1e9 * case.get('lead_s', 0.0))

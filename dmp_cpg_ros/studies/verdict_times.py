@@ -21,8 +21,9 @@ from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.verdict import Change
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
-from dmp_cpg_ros.studies import adversary_suite
-from dmp_cpg_ros.studies.certificate_settings import GAITS, SCALE
+from dmp_cpg_ros.studies import adversary_draws
+from dmp_cpg_ros.studies.certificate_settings import SCALE
+from dmp_cpg_ros.studies.oscillator_loop import gaits_of
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of, write_results
 
 LIMIT_S = 0.05
@@ -84,10 +85,11 @@ def _row(name: str, judged: Sequence[Judged]) -> tuple[str, ...]:
 
 def _judged(rng: np.random.Generator) -> list[Judged]:
     """Some changes of one random setting; none where it is impossible or not certified."""
-    case = adversary_suite.setting(rng)
-    names = [case['gait'], *(name for name in rng.permutation(list(GAITS)).tolist()
+    case = adversary_draws.setting(rng)
+    gaits = gaits_of(case)
+    names = [case['gait'], *(name for name in rng.permutation(list(gaits)).tolist()
                              if name != case['gait'])][:rng.integers(1, 4)]
-    first, *others = [GAITS[name] for name in names]
+    first, *others = [gaits[name] for name in names]
     try:
         running = Running(SuiteParameters(), first, SCALE, case['tick_s'], tuple(others)
                           ).changed(case['parameters'])
@@ -101,10 +103,10 @@ def _judged(rng: np.random.Generator) -> list[Judged]:
         values, proposed = dict[str, Any](), running
         try:
             if rng.random() < 0.2:
-                gait = GAITS[str(rng.choice(list(GAITS)))]
+                gait = gaits[str(rng.choice(list(gaits)))]
                 values, proposed = {'gait': gait.name}, replace(running, gait=gait)
             for _ in range(rng.integers(0 if values else 1, 4)):
-                values |= adversary_suite.random_change(rng, _CHANGEABLE)
+                values |= adversary_draws.random_change(rng, _CHANGEABLE)
             proposed = proposed.changed(
                 {name: value for name, value in values.items() if name != 'gait'})
             if rng.random() < 0.3:

@@ -145,13 +145,13 @@ class CycleOfLegs(ABC):
         """Foot speed that a velocity leaves up to the highest one [m/s]."""
         return max(0.0, scale.speed(self.highest(scale)) - self.limiting_speed(velocity, scale))
 
-    def limited(self, velocity: Triple, scale: BodyScale, largest_curve: float = inf) -> Triple:
-        """Velocity (v_x, v_y [m/s], γ [rad/s]) within the highest speed and the largest curve, as
-        a share of g, that goes with it: :mod:`~dmp_cpg_ros.core.gait.speed_limit`.
+    def limited(self, velocity: Triple, scale: BodyScale, max_curve: float = inf) -> Triple:
+        """Velocity (v_x, v_y [m/s], γ [rad/s]) within the highest speed and what ``max_curve``
+        leaves of curves: :mod:`~dmp_cpg_ros.core.gait.speed_limit`.
         """
         return speed_limit.within_limit(
             velocity, self.limiting_speed(velocity, scale), scale.speed(self.highest(scale)),
-            largest_curve * GRAVITY)
+            max_curve * max(self.two_sided, speed_limit.ONE_SIDED) * GRAVITY)
 
     def pace(self, r: Array, scale: BodyScale) -> Pace:
         """What the gait makes of a reference (v_x, v_y, γ), ndarray (3,); the last answer is

@@ -17,7 +17,8 @@ with the speed alone. Commands therefore keep to
     s² + c² ≤ 1 ,    c = u |γ| / (κ g) ,
 
 with s the speed's share of the highest one and κ the parameter ``max_curve`` times the share of
-stance in which feet of both sides stand, for one side alone does not hold the roll of a curve; a
+stance in which feet of both sides stand, for one side alone does not hold the roll of a curve, or
+``ONE_SIDED`` where they never do, for a gait that could not turn at all could not be led home; a
 reference on its way to a command is never far outside. Legs that all swing together turn the
 body meanwhile, the more the less its inertia, and across the way it stands on a narrower track:
 speed sideways and from turning then counts (I_yy/I_xx) (x/y) times in s, with x and y the feet's
@@ -51,6 +52,10 @@ from dmp_cpg_ros.core.maths.vec3 import Triple
 
 BEYOND = 5.0
 """Dimensionless speed beyond any of legged animals and robots, to look for a limit up to twice it.
+"""
+
+ONE_SIDED = 0.05
+"""Least share of stance on both sides by which curves count; the package's gaits have more.
 """
 
 

@@ -140,7 +140,7 @@ class CommandGate:
         within = [(limited, cut_by)]
         for gait in self._ends:
             assert self._scale is not None
-            limited = gait.limited(limited, self._scale, p.max_curve * gait.two_sided)
+            limited = gait.limited(limited, self._scale, p.max_curve)
             within.append((limited, cut_by if limited == in_range else 'gait'))
         self._on_the_way, self._arrived = within[-1], within[:2][-1]
 
