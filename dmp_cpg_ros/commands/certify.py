@@ -88,9 +88,9 @@ def running(suite: Suite) -> Running:
     """
     from dmp_cpg_ros.robot.model_reader import load_description
 
-    choice, scale = suite.parameters.gait_choice, body_scale(load_description(suite.robot_file))
-    chosen = [suite.gaits.named(name) for name in choice.auto_gaits if choice.auto_gait]
-    others = tuple(gait for gait in chosen if gait.name != suite.gait.name)
+    scale = body_scale(load_description(suite.robot_file))
+    others = tuple(gait for gait in suite.gaits.chosen(suite.parameters.gait_choice)
+                   if gait.name != suite.gait.name)
     return Running(suite.parameters, suite.gait, scale, suite.tick_ns * 1e-9, others)
 
 

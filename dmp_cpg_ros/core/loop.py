@@ -278,8 +278,7 @@ class WalkingLoop:
 
     def _described(self, parameters: SuiteParameters, gait: Gait) -> Running:
         """What a certificate is computed from."""
-        choice = parameters.gait_choice
-        others = [self._reader.named(name) for name in choice.auto_gaits if choice.auto_gait]
+        others = self._reader.chosen(parameters.gait_choice)
         return Running(
             parameters, gait, self.canonical.scale, self._dt,
             tuple(other for other in others if other is not gait), self.canon.cadence_scale)

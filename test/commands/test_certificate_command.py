@@ -44,6 +44,9 @@ def test_gaits_that_are_chosen_are_certified_together_as_the_nodes_do(
     assert ': walk, bound at up to' in told.out and 'fails: capture' in told.err
     assert main(['--proof', str(tmp_path / 'proof.json'), *chosen, 'auto_gait:=true']) == 2
     assert 'auto_gait' in capsys.readouterr().err
+    assert main(['--ros-args', '-p', 'auto_gait:=true', '-p', 'auto_gaits:=[walk, gallop]',
+                 '-p', 'auto_speeds:=[0.5]']) == 2
+    assert "auto_gaits: there is no gait 'gallop'; valid are amble" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize('legs', ['[fl]', '[auto]'])

@@ -14,6 +14,7 @@ from math import isfinite
 from typing import NamedTuple
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce, GaitTransition
 from dmp_cpg_ros.core.parameters import shown
@@ -99,6 +100,13 @@ class KnownGaits:
             raise ParameterError(
                 f"there is no gait {shown(name)}; valid are {', '.join(self.gaits)}")
         return self.gaits[name]
+
+    def chosen(self, choice: GaitChoiceParameters) -> tuple[Gait, ...]:
+        """Gaits that are chosen among; none without ``auto_gait``. Raises as :meth:`named`."""
+        try:
+            return tuple(map(self.named, choice.auto_gaits if choice.auto_gait else ()))
+        except ParameterError as error:
+            raise ParameterError(f'auto_gaits: {error}') from None
 
     def _gait_of(self, shares: GaitShares) -> GaitInForce:
         before, after, share, rate, factor = shares

@@ -155,10 +155,9 @@ class Certified:
         """What parameter sets describe, or the same with other gaits; raises ParameterError for a
         gait that there is not.
         """
-        choice = sets[GaitChoiceParameters]
-        chosen = choice.auto_gaits if choice.auto_gait else ()
-        names = names or (sets[suite.GaitParameters].gait, *chosen)
-        gait, *others = [self.gaits.named(name) for name in dict.fromkeys(names)]
+        chosen = self.gaits.chosen(sets[GaitChoiceParameters])
+        gaits = [self.gaits.named(name) for name in names or (sets[suite.GaitParameters].gait,)]
+        gait, *others = dict.fromkeys([*gaits, *(() if names else chosen)])
         return gate.Running(
             suite.SuiteParameters.of(sets), gait, self._scale,
             sets[suite.TickParameters].tick_ns * 1e-9, tuple(others),

@@ -42,10 +42,10 @@ def known_gaits(node: SuiteNode) -> KnownGaits:
 
 def check_gaits(sets: Sets) -> None:
     """Raise ParameterError for a gait that parameters choose and their file does not have."""
-    chosen, choice = sets[GaitParameters], sets[GaitChoiceParameters]
-    known = KnownGaits(load_gaits(chosen.gaits_file))
-    for name in (chosen.gait, *(choice.auto_gaits if choice.auto_gait else ())):
-        known.named(name)
+    walked = sets[GaitParameters]
+    known = KnownGaits(load_gaits(walked.gaits_file))
+    known.named(walked.gait)
+    known.chosen(sets[GaitChoiceParameters])
 
 
 def gait_name(node: SuiteNode) -> str:
