@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dmp_cpg_ros.core.estimation.velocity_filter import TILT, FilterState
+from dmp_cpg_ros.core.estimation.velocity_filter import TILT, VELOCITY, FilterState
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.maths.rotations import turned
@@ -51,6 +51,11 @@ AGREED_S = 0.3
 
 BACK_S = 0.4
 """Least age of the state that was not spoilt yet, when an IMU begins to be in doubt [s]."""
+
+GUESSED = 0.2
+"""Deviation of a velocity that is a guess, of a body that has felt nothing for a while [m/s]: what
+the feet take back of it tells nothing of the IMU. One that is felt is known to 0.03 m/s.
+"""
 
 UPRIGHT = cos(0.6)
 """Tilt from which feet tell nothing: who tumbles needs the IMU, whatever it is like."""
@@ -105,7 +110,8 @@ class ImuWatch(NamedTuple):
         if not (readings.imu_is_usable and all(readings.usable_legs)):
             return ImuWatch(doubted_s=self.doubted_s)
         up, velocity = upward(after.quaternion.tolist()), triple(after.velocity_in_base.tolist())
-        if up[2] < UPRIGHT:
+        guessed = max(before.covariance.diagonal()[VELOCITY].tolist()) > GUESSED * GUESSED
+        if up[2] < UPRIGHT or guessed and not self.doubted_s:
             return NEW
         turning = minus(rate, triple(after.gyro_bias.tolist()))
         change = minus(velocity, triple(before.velocity_in_base.tolist()))

@@ -8,7 +8,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from body_motions import SWAY, point_footed, readings
+from body_motions import SWAY, Sway, point_footed, readings
 from core_examples import TICK
 
 from dmp_cpg_ros.core.estimation.body_estimate import BodyEstimate
@@ -71,6 +71,28 @@ def test_it_is_believed_again_once_it_has_agreed(exact: list[SensorReadings]) ->
     found = estimates(exact, ROLLS, ALONG)
     assert 'imu' not in found[-1].problems
     assert tilt_errors(found)[-1] < 0.02
+
+
+def test_a_velocity_that_was_a_guess_puts_no_imu_in_doubt() -> None:
+    """A body feels nothing for two seconds, in which it turns back: that its velocity was not what
+    it was is nothing that the IMU told.
+    """
+    sway = Sway(np.array([0.08, 0.0, 0.01, 0.0, 0.03, 0.0]), np.array([8.0, 0, 9, 0, 6, 0]))
+    there = 0.5 + (2.0 * np.pi + 0.5 * np.pi) / 8.0
+    back = there + 2.0 + ((np.pi - 16.0) % (2.0 * np.pi)) / 8.0
+    estimator, memory = BodyEstimator(ROBOT, EstimationParameters()), None
+    for k, reading in enumerate(readings(ROBOT, sway, back + 1.5)):
+        felt = not there <= k * TICK < back
+        if not felt:
+            reading = dataclasses.replace(reading, **{
+                name: np.full_like(getattr(reading, name), np.nan) for name in (
+                    'joint_position', 'joint_velocity', 'rate_in_base',
+                    'specific_force_in_base', 'foot_force')})
+        memory, estimate = estimator.step(memory, reading)
+        assert ('imu' in estimate.problems) == (not felt)
+    velocity, (_, R) = sway.velocity(k * TICK)[0], sway.pose(k * TICK)
+    np.testing.assert_allclose(estimate.velocity_in_base, R.T @ velocity, atol=0.02)
+    np.testing.assert_allclose(upward(estimate.quaternion.tolist()), R[2], atol=0.02)
 
 
 def test_the_plane_of_the_feet_brings_a_vertical_back() -> None:
