@@ -1,0 +1,49 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Robots that are drawn are found as they were drawn, and walk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('mujoco')
+
+from dmp_cpg_ros.robot.model_inspection import inspect_model
+from dmp_cpg_ros.studies.random_robots import GAITS, Shape, trial
+
+SEEDS = range(12)
+
+
+@pytest.mark.parametrize('seed', SEEDS)
+def test_a_drawn_robot_is_found_as_it_was_drawn(seed: int, tmp_path: Path) -> None:
+    shape, model = Shape.drawn(seed), tmp_path / 'drawn.xml'
+    model.write_text(shape.mjcf(seed), encoding='utf-8')
+    found = inspect_model(model).description
+    assert found.mass == pytest.approx(shape.mass, rel=1e-4)
+    for k, leg in enumerate(found.legs):
+        hind, right = k >= 2, k % 2 == 1
+        x, y = shape.half_length * shape.leg, shape.half_width * shape.leg
+        assert np.linalg.norm(leg.thigh) + np.linalg.norm(leg.shank) == pytest.approx(
+            shape.leg, rel=1e-3)
+        assert (leg.knee_sign > 0) == (hind and shape.forwards)
+        assert (leg.axis_sign < 0.0).tolist() == [False, shape.turned, shape.turned]
+        np.testing.assert_allclose(
+            leg.hip_in_base, (-x if hind else x, -y if right else y, 0.0), rtol=1e-4)
+        radius = shape.foot * shape.leg
+        assert 0.7 * radius < leg.foot_radius <= radius + 1e-6  # soft feet give way
+
+
+def test_drawn_robots_differ_in_all_that_can_be_drawn() -> None:
+    shapes = [Shape.drawn(seed) for seed in SEEDS]
+    assert all(len(set(values)) > 1 for values in zip(*shapes, strict=True))
+    assert Shape.drawn(3) == shapes[3] and Shape.drawn(3).mjcf(3) == shapes[3].mjcf(3)
+
+
+def test_a_drawn_robot_walks_at_the_speed_that_is_asked_and_stops_as_predicted() -> None:
+    outcome = trial(seed=1, seconds=4.0)
+    assert not outcome.wrong
+    assert [stop[0] for stop in outcome.stops] == list(GAITS)
+    assert max(outcome.error.values()) < 0.02
