@@ -34,10 +34,17 @@ CALMING, AT_ONCE, LANDED, LONGEST_CALMING = 0.31, 0.12, 0.44, 0.8
 its feet, where it does not, where all feet come down at once, and what no trial exceeded.
 """
 
+STOPPED = 1e-3
+"""Speed below which a reference that brakes has stopped [m/s]."""
+
 FOLLOWING, SLOW = 0.1, 0.12
 """The body follows the reference's speed in this time [s], and does not swing back if it goes
 slower than this [m/s] as the last foot comes down.
 """
+
+TRAILING = tuple(tuple(tuple(k == leg for k in range(4)) for leg in legs)
+                 for legs in ((2, 3), (0, 1)))
+"""Feet in the air where only one does not stand that trails: a hind foot, and backwards a fore."""
 
 BALANCED, OWN_CADENCE = 0.9, 0.95
 """Share of the stance in which feet of both sides and ends stand, and factor on a gait's cadence,
@@ -122,8 +129,8 @@ def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canoni
     Outlook
         At the end.
     """
-    down_s, way_m, speed, stop = 0.0, 0.0, hypot(r[0], r[1]), state.requested
-    body, calming_s, followed = speed, CALMING, 1.0 - exp(-dt / FOLLOWING)
+    way_m, speed, stop = 0.0, hypot(r[0], r[1]), state.requested
+    body = _Body(r, reference.parameters.braking > 0.0, dt)
     ticks = ticks_ahead(supervisor, reference, canonical, state, published, canon, r, command, dt,
                         body_mode)
     for k, (state, _, canon, r) in zip(range(1, ceil(horizon / dt) + 1), ticks, strict=False):
@@ -132,24 +139,63 @@ def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canoni
         yield
         if stop:
             way_m += dt * hypot(r[0], r[1])
-            body += followed * (hypot(r[0], r[1]) - body)
-            if _up(canon, state, canon.gait.pace(r, canonical.scale)[3]):
-                down_s, calming_s = k * dt, _calming(
-                    canon.gait, body, reference.parameters.braking > 0.0)
+            body.follow(k * dt, r, canon.gait,
+                        _up(canon, state, canon.gait.pace(r, canonical.scale)[3]))
         if state.state in ('at_rest', 'walking', 'free', 'stepping'):
-            return Outlook(k * dt, down_s if stop else nan, way_m, speed, calming_s)
+            return Outlook(k * dt, body.down_s if stop else nan, way_m, speed, body.calming_s)
     return Outlook(inf, nan, nan, speed)
 
 
-def _calming(gait: GaitInForce, speed: float, brakes: bool) -> float:
-    """How long a body takes to calm down that goes so fast [m/s] as the last foot comes down, in
-    the middle of trials [s].
+class _Body:
+    """What is told of a body that follows a reference to rest.
+
+    Without ``braking`` of the reference the last foot that comes down tells when it stands. A body
+    that brakes stands ``CALMING`` after its reference does, or after that foot where it is later;
+    but one that trails, alone, when the others stand already, holds up none.
+
+    Parameters
+    ----------
+    r : ndarray (3,)
+        Reference at the request.
+    brakes : bool
+        Whether the reference brakes.
+    dt : float
+        Tick [s].
     """
-    if gait.apart == 0.0:
-        return LANDED
-    sways = not (gait.firm >= 1.0 and gait.two_sided >= BALANCED
-                 and gait.cadence_scale >= OWN_CADENCE)
-    return CALMING if sways or brakes or speed > SLOW else AT_ONCE
+
+    def __init__(self, r: Array, brakes: bool, dt: float) -> None:
+        self._speed, self._brakes, self._share = hypot(r[0], r[1]), brakes, 1.0 - exp(
+            -dt / FOLLOWING)
+        self._trails = TRAILING[bool(r[0] < 0.0)]
+        self._stopped_s = self._held_s = self.down_s = 0.0
+        self._calming_s = CALMING
+
+    def follow(self, time_s: float, r: Array, gait: GaitInForce, up: tuple[bool, ...]) -> None:
+        """Take a tick at a time after the request [s], with the feet that are in the air."""
+        speed = hypot(r[0], r[1])
+        self._speed += self._share * (speed - self._speed)
+        if speed > STOPPED:
+            self._stopped_s = time_s
+        if any(up):
+            self.down_s, self._calming_s = time_s, self._calming(gait)
+            self._held_s = 0.0 if up in self._trails else time_s
+
+    @property
+    def calming_s(self) -> float:
+        """How long it takes to calm down after the last foot came down, in the middle of trials
+        [s].
+        """
+        if not self._brakes or self._calming_s == LANDED:
+            return self._calming_s
+        return max(AT_ONCE, max(self._stopped_s, self._held_s) + CALMING - self.down_s)
+
+    def _calming(self, gait: GaitInForce) -> float:
+        """The same where nothing but the last foot, which is down in this tick, tells it [s]."""
+        if gait.apart == 0.0:
+            return LANDED
+        sways = not (gait.firm >= 1.0 and gait.two_sided >= BALANCED
+                     and gait.cadence_scale >= OWN_CADENCE)
+        return CALMING if sways or self._speed > SLOW else AT_ONCE
 
 
 def look_ahead(*arguments: Any, **options: Any) -> Outlook:
@@ -210,11 +256,11 @@ def next_gait(reference: ReferenceSystem, canonical: RunningGait, published: Ann
             return canon.gait
 
 
-def _up(canon: CanonicalState, state: SupervisorState, duty: float) -> bool:
-    """Whether a foot is in the air."""
+def _up(canon: CanonicalState, state: SupervisorState, duty: float) -> tuple[bool, ...]:
+    """Which feet are in the air, of fl, fr, rl, rr."""
+    up = []
     for (x_1, x_2), activity in zip(canon.x.tolist(), state.activity.tolist(), strict=True):
         position = canon.gait.scalar_cycle_position(scalar_phase(x_1, x_2))
         swung = position / (1.0 - duty) + 0.5
-        if 0.0 < swung < 1.0 and activity * swing_height(swung)[0] > DOWN:
-            return True
-    return False
+        up.append(0.0 < swung < 1.0 and activity * swing_height(swung)[0] > DOWN)
+    return tuple(up)
