@@ -142,17 +142,17 @@ def test_a_body_stands_when_it_was_told_to(gait: str, speed: float) -> None:
 
 
 @pytest.mark.parametrize(('gait', 'speed', 'phases'), [
-    ('amble', 0.5, (0.125, 0.375)), ('amble', 1.0, (0.3125, 0.5625)), ('trot', 1.0, (0.0, 0.25))])
+    ('amble', 0.5, (0.125, 0.375)), ('amble', 1.0, (0.3125, 0.5625)),
+    ('amble', -0.5, (0.125, 0.375)), ('trot', 1.0, (0.0, 0.25))])
 def test_a_body_that_brakes_stands_when_it_was_told_to(
         gait: str, speed: float, phases: tuple[float, float]) -> None:
-    """It stands soon after its reference, or after the last foot, but for a hind foot alone: with
-    one time from the last foot on an amble stood up to 36 % earlier than was told.
+    """It stands soon after its reference, or after the last foot, but ahead for a hind foot alone:
+    with one time from the last foot on an amble stood up to 36 % earlier than was told.
     """
     cases = [StopCase(gait, speed, phase, leg='auto', braking=3.8, resumes=False)
              for phase in phases]
-    took = [of.still_s for of in run_walk(cases, None)
-            if of.standing and of.stands_s == pytest.approx(of.still_s, rel=0.1)]
-    assert len(took) == 2 and (gait == 'trot' or abs(took[0] - took[1]) > 0.15)
+    for of in run_walk(cases, None):
+        assert of.standing and of.stands_s == pytest.approx(of.still_s, rel=0.1)
 
 
 def test_a_record_is_gone_on_with_and_changes_nothing(tmp_path: Path) -> None:

@@ -42,9 +42,8 @@ FOLLOWING, SLOW = 0.1, 0.12
 slower than this [m/s] as the last foot comes down.
 """
 
-TRAILING = tuple(tuple(tuple(k == leg for k in range(4)) for leg in legs)
-                 for legs in ((2, 3), (0, 1)))
-"""Feet in the air where only one does not stand that trails: a hind foot, and backwards a fore."""
+HIND_ALONE = (False, False, True, False), (False, False, False, True)
+"""Feet in the air where none but a hind foot is."""
 
 BALANCED, OWN_CADENCE = 0.9, 0.95
 """Share of the stance in which feet of both sides and ends stand, and factor on a gait's cadence,
@@ -151,7 +150,8 @@ class _Body:
 
     Without ``braking`` of the reference the last foot that comes down tells when it stands. A body
     that brakes stands ``CALMING`` after its reference does, or after that foot where it is later;
-    but one that trails, alone, when the others stand already, holds up none.
+    but a hind foot that comes down alone, when the others stand already, holds up none that went
+    ahead (backwards it does).
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ class _Body:
     def __init__(self, r: Array, brakes: bool, dt: float) -> None:
         self._speed, self._brakes, self._share = hypot(r[0], r[1]), brakes, 1.0 - exp(
             -dt / FOLLOWING)
-        self._trails = TRAILING[bool(r[0] < 0.0)]
+        self._passed = HIND_ALONE if r[0] >= 0.0 else ()
         self._stopped_s = self._held_s = self.down_s = 0.0
         self._calming_s = CALMING
 
@@ -178,7 +178,7 @@ class _Body:
             self._stopped_s = time_s
         if any(up):
             self.down_s, self._calming_s = time_s, self._calming(gait)
-            self._held_s = 0.0 if up in self._trails else time_s
+            self._held_s = 0.0 if up in self._passed else time_s
 
     @property
     def calming_s(self) -> float:
