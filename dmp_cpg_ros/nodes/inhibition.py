@@ -194,7 +194,7 @@ class InhibitionNode(SuiteNode):
         if self._state.block.acts == before.block.acts:
             return
         if self._state.block.acts:
-            self.warn('blocked', 'walked and made no way: stopped as before an obstacle; a '
+            self.warn('blocked', f'stopped as before an obstacle: {self._state.block.why}; a '
                       'command that leads elsewhere, or inhibit with false, starts the gait')
         else:
             self.clear('blocked')

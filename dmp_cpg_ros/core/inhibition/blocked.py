@@ -66,6 +66,11 @@ SLOW, BRISK = 0.04, 0.15
 SAME_WAY = 0.5
 """Cosine between two directions that count as the same."""
 
+NO_WAY, FEET_HELD, TOO_HIGH = (
+    'the body made no way', 'its leading feet were held up',
+    'a foot met what is too high to be climbed')
+"""Why a walk was stopped, in words for people."""
+
 
 class Progress(NamedTuple):
     """How the body comes ahead.
@@ -113,6 +118,8 @@ class BlockState(NamedTuple):
         Way asked for while the leading feet were held, less that while they were not [m].
     comes : float
         Speed along the reference, in the mean [m/s].
+    why : str
+        Why it was stopped; empty while it is not.
     """
 
     acts: bool = False
@@ -123,6 +130,7 @@ class BlockState(NamedTuple):
     most: float = 1.0
     pinned: float = 0.0
     comes: float = 0.0
+    why: str = ''
 
     def leads_there(self, command: tuple[float, float, float]) -> bool:
         """Whether a command (v_x, v_y, γ) leads to the obstacle."""
@@ -170,6 +178,7 @@ def block_step(state: BlockState, r: Array, wanted: float, progress: Progress | 
         far = 0.0
     most = min(1.0, max(LEAST, (PINNED - far) / (PINNED - HELD)))
     pinned = max(0.0, state.pinned + (due if far > HELD else -due))
-    blocked = (asked > PATIENCE * leg_length or pinned > FIRM * leg_length
-               or progress.high > 0.0)
-    return BlockState(blocked, ahead, made, asked, behind, most, pinned, comes_on)
+    why = (TOO_HIGH if progress.high > 0.0 else FEET_HELD if pinned > FIRM * leg_length
+           else NO_WAY if asked > PATIENCE * leg_length else '')
+    return BlockState(
+        bool(why), ahead, made, asked, behind, most, pinned, comes_on, why)

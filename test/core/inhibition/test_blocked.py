@@ -28,14 +28,17 @@ from dmp_cpg_ros.core.balance.progress import feet_behind
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.inhibition.blocked import (
     BRISK,
+    FEET_HELD,
     FIRM,
     HELD,
     NO_BLOCK,
+    NO_WAY,
     PATIENCE,
     PINNED,
     SLOW,
     SLUGGISH,
     STEP,
+    TOO_HIGH,
     Progress,
     block_step,
 )
@@ -79,6 +82,7 @@ def test_a_body_that_makes_no_way_stops_as_predicted_and_stays() -> None:
     assert run.until('waiting') == pytest.approx(patience, rel=0.02)
     assert run.loop.stop.block.acts and run.loop.inhibition.requested
     assert not run.loop.inhibition.automatic
+    assert run.loop.stop.block.why == NO_WAY
     predicted, bound = ahead(run.loop), run.loop.time_to_rest()
     assert run.until('at_rest') == pytest.approx(predicted) and predicted <= bound
     run.go(4.0)
@@ -173,6 +177,7 @@ def test_a_body_waits_for_feet_that_are_held_and_stops_when_they_stay_so() -> No
     while not state.acts:
         state, ticks = block_step(state, r, 0.5, held, LENGTH, TICK), ticks + 1
     assert ticks * TICK * BRISK * FROUDE == pytest.approx(FIRM * LENGTH, rel=0.1)
+    assert state.why == FEET_HELD
 
 
 @pytest.mark.parametrize('caution', [True, False])
@@ -219,7 +224,9 @@ def test_feet_on_their_way_are_not_behind_and_held_ones_are_as_far_as_they_are(
 def test_what_is_too_high_blocks_at_once() -> None:
     r, going = np.array((0.5, 0.0, 0.0)), Progress((0.5, 0.0))
     assert not block_step(NO_BLOCK, r, 0.5, going, LENGTH, TICK).acts
-    assert block_step(NO_BLOCK, r, 0.5, going._replace(high=1.0), LENGTH, TICK).acts
+    high = block_step(NO_BLOCK, r, 0.5, going._replace(high=1.0), LENGTH, TICK)
+    assert high.acts and high.why == TOO_HIGH
+    assert block_step(high, r, 0.5, going, LENGTH, TICK).why == ''
     assert not block_step(NO_BLOCK, 0.0 * r, 0.0, going._replace(high=1.0), LENGTH, TICK).acts
 
 
