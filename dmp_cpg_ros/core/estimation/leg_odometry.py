@@ -139,30 +139,33 @@ def shank_rate(sign: Sequence[float], angle: Sequence[float], rate: Sequence[flo
     return sign[0] * rate[0], cos(abduction) * pitching, sin(abduction) * pitching
 
 
-def turn_rate_of_feet(contact_in_base: Array, velocity_in_base: Array, trust: Array) -> Array:
-    """Angular velocity of a body from the feet alone, for when its gyroscope is silent.
+def turn_rate_of_feet(contact_in_base: Array, velocity_in_base: Array, trust: Array,
+                      otherwise: Array) -> Array:
+    """Angular velocity of a body from the feet, for when its gyroscope cannot be believed.
 
-    Least squares of v + ω × r_i = m_i, weighted by the trust and slightly damped: two feet tell
-    nothing of a turn about the line between them, and one tells nothing at all.
+    Least squares of v + ω × r_i = m_i, whose deviations go with 1/trust, and of another guess of
+    ω: two feet tell nothing of a turn about the line between them, and one nothing at all.
 
     Parameters
     ----------
     contact_in_base, velocity_in_base : ndarray (n, 3)
         r_i [m] and m_i [m/s].
     trust : ndarray (n,)
-        Weights, not all 0.
+        In the feet, not all 0.
+    otherwise : ndarray (3,)
+        What it is as far as the feet do not tell [rad/s].
 
     Returns
     -------
     ndarray (3,)
         ω in the base [rad/s].
     """
-    weight = trust / trust.sum()
-    r = contact_in_base - weight @ contact_in_base
-    m = velocity_in_base - weight @ velocity_in_base
-    squares = float(weight @ (r * r).sum(axis=1)) + 1e-4
-    normal = squares * np.eye(3) - (weight[:, None] * r).T @ r
-    return np.linalg.solve(normal, weight @ np.cross(r, m))
+    weight = trust * trust
+    r = contact_in_base - weight @ contact_in_base / weight.sum()
+    m = velocity_in_base - weight @ velocity_in_base / weight.sum()
+    damping, squares = np.array(DAMPING), float(weight @ (r * r).sum(axis=1))
+    normal = np.diag(squares + damping) - (weight[:, None] * r).T @ r
+    return np.linalg.solve(normal, weight @ np.cross(r, m) + damping * otherwise)
 
 
 def force_from_torque(jacobian: Array, torque: Array, normal_in_base: Array) -> float:
@@ -188,6 +191,12 @@ def force_from_torque(jacobian: Array, torque: Array, normal_in_base: Array) -> 
         return 0.0
     return float(normal_in_base @ np.linalg.solve(jacobian.T, -torque))
 
+
+DAMPING = (5e-3, 5e-3, 1e-4)
+"""Variance of what a foot tells of a velocity over that of a guess of the turn rates [m²]:
+(0.1 m/s / 1.4 rad/s)² of rolling and pitching, for a foot that has just come down still moves, and
+is far from the line between those that carry.
+"""
 
 STEEPEST = 0.7
 """Largest slope that is believed; 35 degrees."""

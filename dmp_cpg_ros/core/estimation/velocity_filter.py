@@ -112,7 +112,7 @@ def _skew(v: Triple, scale: float) -> tuple[float, ...]:
 
 
 def predict(state: FilterState, rate: Array, specific_force: Array, dt: float,
-            noise: EstimationParameters) -> FilterState:
+            noise: EstimationParameters, guessed: bool = False) -> FilterState:
     """Predict by the IMU's readings.
 
     Parameters
@@ -125,6 +125,9 @@ def predict(state: FilterState, rate: Array, specific_force: Array, dt: float,
         Length of the interval [s].
     noise : EstimationParameters
         What the filter believes of its sensors.
+    guessed : bool
+        Whether the readings are guesses of a body that does not accelerate: what it does all the
+        same comes from no error of the vertical or of a bias.
 
     Returns
     -------
@@ -143,7 +146,7 @@ def predict(state: FilterState, rate: Array, specific_force: Array, dt: float,
     # The new velocity is seen from the new orientation.
     back, twice = cross(turn, moved(v, change, 0.5)), cross(turn, cross(turn, v))
     velocity = np.array(moved(minus(vec3.plus(v, change), back), twice, 0.5))
-    F = transition(v, up, turning, dt)
+    F = _IDENTITY if guessed else transition(v, up, turning, dt)
     P = F.dot(state.covariance).dot(F.T)
     P.ravel()[::13] += noise.spread * dt
     return FilterState(turned(state.quaternion, np.array(turn)), velocity, state.gyro_bias,

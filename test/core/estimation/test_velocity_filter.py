@@ -178,16 +178,42 @@ def test_a_foot_that_disagrees_weighs_less() -> None:
     assert gains[0] > 1.5 * gains[1] > 10.0 * gains[2] > 0.0
 
 
+def test_a_body_that_accelerates_unseen_does_not_tilt() -> None:
+    """What a guess misses is no error of the vertical, as what an IMU does not tell may be."""
+    zero, level = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
+    tilts = []
+    for guessed in (False, True):
+        state = FilterState(level, zero, zero, zero, 1e-3 * np.eye(12))
+        for _ in range(100):
+            state = predict(state, zero, np.array([0.0, 0.0, GRAVITY]), 4e-3, NOISE, guessed)
+        after, _ = update(state, zero, [(0.2, 0.1, -0.3)], [(0.3, 0.0, 0.0)], [1.0], NOISE)
+        tilts.append(np.abs(roll_pitch_yaw(after.quaternion)).max())
+    assert tilts[0] > 0.01 and not tilts[1]
+
+
 def test_feet_tell_the_turn_rate() -> None:
     v, rate = RANDOM.normal(0.0, 1.0, 3), RANDOM.normal(0.0, 1.0, 3)
     contact = np.array([[x, y, -0.3] for x in (0.2, -0.2) for y in (0.1, -0.1)])
     measured = v + np.cross(rate, contact)
-    trust = np.array([1.0, 0.3, 0.8, 1.0])
-    np.testing.assert_allclose(turn_rate_of_feet(contact, measured, trust), rate, rtol=0.02)
-    two = turn_rate_of_feet(contact[:2], measured[:2], trust[:2])  # on a line along y
-    assert two[1] == pytest.approx(0.0, abs=1e-12)
-    np.testing.assert_allclose(two[[0, 2]], rate[[0, 2]], rtol=0.02)
-    assert not turn_rate_of_feet(contact[:1], measured[:1], trust[:1]).any()
+    trust, nothing, other = np.array([1.0, 0.3, 0.8, 1.0]), np.zeros(3), RANDOM.normal(size=3)
+    alone = turn_rate_of_feet(contact, measured, trust, nothing)
+    np.testing.assert_allclose(alone, rate, rtol=0.2)
+    np.testing.assert_allclose(turn_rate_of_feet(contact, measured, trust, rate), rate)
+    two = turn_rate_of_feet(contact[:2], measured[:2], np.ones(2), other)  # on a line along y
+    assert two[1] == pytest.approx(other[1])
+    assert two[0] == pytest.approx(0.8 * rate[0] + 0.2 * other[0])
+    assert two[2] == pytest.approx(rate[2], rel=0.05)
+    one = turn_rate_of_feet(contact[:1], measured[:1], trust[:1], other)
+    np.testing.assert_allclose(one, other)
+
+
+def test_a_foot_that_has_just_come_down_turns_no_body() -> None:
+    """It still moves, and is far from the line between the two that stand."""
+    contact = np.array([[0.2, 0.1, -0.3], [-0.2, -0.1, -0.3], [0.2, -0.1, -0.3]])
+    measured = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.5]])
+    turns = [np.linalg.norm(turn_rate_of_feet(contact, measured, np.array([1.0, 1.0, trust]),
+                                              np.zeros(3))) for trust in (0.1, 0.3, 1.0)]
+    assert turns[0] < 0.1 * turns[2] < 0.5 * turns[1] < turns[2]
 
 
 def test_rotations_agree_with_each_other() -> None:
