@@ -73,7 +73,8 @@ class ImuWatch(NamedTuple):
     unexplained : tuple of float
         Mean of a [m/s²].
     turning : tuple of float
-        Mean by which the gyroscope turns faster than the feet do, while it is in doubt [rad/s].
+        Mean by which the gyroscope turns faster than the feet do, as far as these tell, while it
+        is in doubt [rad/s].
     doubted_s, agreed_s : float
         Time for which it has been in doubt, and has agreed since [s]; 0 while it is believed.
     kept, next_kept : Unspoilt or None
@@ -108,7 +109,7 @@ class ImuWatch(NamedTuple):
             Time between the ticks [s].
         """
         if not (readings.imu_is_usable and all(readings.usable_legs)):
-            return ImuWatch(doubted_s=self.doubted_s)
+            return ImuWatch(turning=self.turning, doubted_s=self.doubted_s)
         up, velocity = upward(after.quaternion.tolist()), triple(after.velocity_in_base.tolist())
         guessed = max(before.covariance.diagonal()[VELOCITY].tolist()) > GUESSED * GUESSED
         if up[2] < UPRIGHT or guessed and not self.doubted_s:
