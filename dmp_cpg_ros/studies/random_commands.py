@@ -174,7 +174,8 @@ def choice(rng: np.random.Generator, gaits: Sequence[str]) -> dict[str, Any]:
 
 
 def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[str] = GAITS,
-          changes: bool = False, auto_gait: bool = False, disturbed: bool = False) -> Outcome:
+          changes: bool = False, auto_gait: bool = False, disturbed: bool = False,
+          rate: float = 0.0) -> Outcome:
     """Walk one course, from a gait that its seed draws.
 
     Parameters
@@ -193,12 +194,15 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
         Whether the gait is chosen by speed; at least two of ``gaits`` then.
     disturbed : bool
         Whether the robot is disturbed meanwhile.
+    rate : float
+        Of the control [Hz]; that of the package's parameter file with 0.
     """
     first = gaits[seed % len(gaits)]
     p = suite_of(robot=robot).parameters.reference
     limits = (p.max_speed, p.max_lateral_speed, p.max_turn_rate)
     disturbance = Disturbance.drawn(seed) if disturbed else UNDISTURBED
-    run = Walk(first, robot, disturbance.world, seed + 1, disturbance.values)
+    run = Walk(first, robot, disturbance.world, seed + 1,
+               (*disturbance.values, *((('control_rate', rate),) if rate else ())))
     outcome = Outcome(seed, disturbed=disturbance.told)
     loop, asked, open_stop = run.loop, (0.0, 0.0, 0.0), None
     events = course(seed, seconds, limits, gaits, changes, auto_gait)
@@ -272,6 +276,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--auto-gait', action='store_true', help='the gait is chosen by speed')
     parser.add_argument('--disturbed', action='store_true', help='a slippery floor, hills and '
                         'bumps, a payload, pushes: each walk has some of them')
+    parser.add_argument('--rate', type=float, default=0.0, metavar='HZ',
+                        help="of the control (default: the parameter file's)")
     parser.add_argument('--seed', type=int, default=0, help='of the first walk (default: 0)')
     return run_command(parser, arguments, _study)
 
@@ -279,7 +285,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _study(options: argparse.Namespace, _: RosArguments) -> int:
     walk = partial(trial, seconds=options.seconds, robot=options.robot, gaits=options.gaits,
                    changes=options.changes, auto_gait=options.auto_gait,
-                   disturbed=options.disturbed)
+                   disturbed=options.disturbed, rate=options.rate)
     outcomes = []
     with Workers(options.workers, options.cluster, progress=True) as workers:
         for outcome in workers.map(walk, range(options.seed, options.seed + options.runs)):
