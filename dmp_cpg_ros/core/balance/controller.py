@@ -217,7 +217,8 @@ class PostureController:
         return PostureState(stride.activity, integral, plan, offset, terrain), PostureFeedback(
             self._torque(body, legs, feet, stride, planned, self._bounce(gait, stride),
                          acceleration),
-            self._shift(stride, gait, plan.expected, measured, planned, beside, R_ground_base),
+            self._shift(stride, gait, plan.expected, measured, planned, beside, R_ground_base,
+                        level if terrain.barred else LEVEL_FEET),
             np.array(self.placement.drift(
                 self.placement.yielding(p, stride.reference[0], gait.firm), measured, planned,
                 stride.activity.tolist(), sway.velocity)),
@@ -262,8 +263,9 @@ class PostureController:
                 slope_lean * lean_y + outside * plan.curve[1] + aside_y)
 
     def _shift(self, stride: Stride, gait: GaitInForce, expected: Pair, measured: Triple,
-               planned: Triple, beside: Pair, R_ground_base: Matrix) -> Array:
-        """Shift of the footholds of swinging feet, ndarray (4, 3) [m]."""
+               planned: Triple, beside: Pair, R_ground_base: Matrix, level: Sequence[float]
+               ) -> Array:
+        """Shift of the footholds of swinging feet, to their levels, ndarray (4, 3) [m]."""
         p, (beside_x, beside_y) = self.parameters, beside
         caught = self.placement.caught(measured, planned, gait.apart)
         lanes = self.lanes.aside(
@@ -273,16 +275,14 @@ class PostureController:
                 self.placement.shift(p, caught, planned, pi * stride.duty / stride.omega), lanes,
                 strict=True)]
         raised = self.placement.raised(p, shift, R_ground_base)
-        return np.array([part for (x, y), up in zip(shift, raised, strict=True)
-                         for part in (x, y, up)]).reshape(-1, 3)
+        return np.array([part for (x, y), up, e in zip(shift, raised, level, strict=True)
+                         for part in (x, y, up + e)]).reshape(-1, 3)
 
     def _ground(self, memory: PostureState, state: RobotState, forces: Array,
                 R_world_base: Matrix, normal_in_base: Triple,
                 legs: Sequence[tuple[Triple, Matrix]], stride: Stride, gait: GaitInForce,
                 measured: Triple, dt: float) -> tuple[Terrain, tuple[float, ...]]:
-        """Memory of the ground, and heights of the feet over the plane with a normal that the body
-        follows [m]; a body tells a first step at low velocities of reference and its own only.
-        """
+        """Memory of the ground, and heights of feet over the plane that the body follows [m]."""
         if not self.parameters.climbing:
             return NOTHING_FELT, LEVEL_FEET
         place = vec3.triple(state.base_position_in_world.tolist())
@@ -300,7 +300,7 @@ class PostureController:
         return memory.terrain.felt(
             place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot, _ in legs],
             n, swung, touches, self.scale.leg_length, calm,
-            all(end.steps == len(LEGS) for end in gait.ends), rests, quiet * dt)
+            all(end.steps == len(LEGS) for end in gait.ends), rests, quiet * dt, dt)
 
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], stride: Stride,
                  under: Pair, error: Pair) -> tuple[float, ...]:

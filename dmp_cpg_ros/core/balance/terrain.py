@@ -38,9 +38,9 @@ that high, ρ is 0 and so are all e_i.
 **Barred.** A foot that meets something higher than ``CLIMBED`` l over the mean of the footholds
 has met what the robot does not climb: one foot may come up there, and the body falls off. A sensor
 that tells anything feigns that; one that has changed its mind more than ``FLICKERS`` times in a
-swing is not believed. The stop is requested (:mod:`~dmp_cpg_ros.core.inhibition.blocked`), and for
-the next ``FADES`` l feet are lifted for footholds only, so that none comes up in the steps that
-are left.
+swing is not believed until it was of one for ``STEADY`` of it: at an edge a foot is shaken, too.
+The stop is requested (:mod:`~dmp_cpg_ros.core.inhibition.blocked`), and for the next ``FADES`` l
+feet come down where the ground was, and ρ goes to what footholds differ by, at ``RELAXES``.
 
 **Gaps.** A foot that is to stand, touches nothing, and is lower than the median of all footholds
 by more than ``HOLLOW`` l is in a gap. For the next ``FADES`` l the body does not follow less of
@@ -104,6 +104,14 @@ the leg; on stairs of 0.36 l, which are, feet met nothing above 0.45 l.
 
 FLICKERS = 6
 """How often a contact sensor may change its mind in a swing of which it is to tell that."""
+
+STEADY = 0.2
+"""Share of a swing for which one that did so more often must have been of one mind."""
+
+RELAXES = 10.0
+"""Rate at which the height that is remembered is given up before an obstacle [1/s]: at once
+the body drops and is thrown up, at 2/s one of two walks fell before a step of 0.7 l.
+"""
 
 FADES = 4.0
 """Way on which the memory fades to 1/e, in lengths of the leg: a few strides."""
@@ -170,6 +178,8 @@ class Terrain(NamedTuple):
         Which feet touched something at the last tick.
     changes : tuple of four int
         How often that has changed in the swing that a foot is in.
+    changed : tuple of four floats
+        Shares of the swing at which it did last.
     """
 
     rough: float = 0.0
@@ -183,6 +193,7 @@ class Terrain(NamedTuple):
     lifted: tuple[bool, ...] = (False,) * 4
     touched: tuple[bool, ...] = (False,) * 4
     changes: tuple[int, ...] = (0,) * 4
+    changed: tuple[float, ...] = (0.0,) * 4
 
     @property
     def followed(self) -> float:
@@ -192,7 +203,7 @@ class Terrain(NamedTuple):
     def felt(self, place: Triple, feet: Sequence[Triple], normal: Triple,
              swung: Sequence[float], touches: Sequence[bool], leg_length: float,
              calm: bool = True, in_turn: bool = True, rests: Sequence[bool] = (False,) * 4,
-             quiet_s: float = 0.0) -> tuple[Terrain, tuple[float, ...]]:
+             quiet_s: float = 0.0, dt: float = 0.0) -> tuple[Terrain, tuple[float, ...]]:
         """Advance by one tick.
 
         Parameters
@@ -218,6 +229,8 @@ class Terrain(NamedTuple):
             Which legs rest on feet that tell what they touch.
         quiet_s : float
             Time of this tick in which feet may go down that then touch nothing [s].
+        dt : float
+            Time since the last tick [s].
 
         Returns
         -------
@@ -228,9 +241,10 @@ class Terrain(NamedTuple):
         """
         way = dist(place, self.place)
         anew = not self.footholds or way > JUMP * leg_length
-        # a foot that hangs in the air, or whose sensor is silent, counts as standing in the end
+        # a foot with a silent sensor stands in the end, but no higher: a tilting body lifts it off
         footholds = tuple(feet) if anew else tuple(
-            now if share < 0.0 or (share > 1.0 and touch) else last
+            now if (touch and not 0.0 <= share <= 1.0) or (
+                share < 0.0 and dot(normal, now) <= dot(normal, last)) else last
             for now, last, share, touch in zip(feet, self.footholds, swung, touches, strict=True))
         heights = [dot(normal, foot) for foot in footholds]
         mean = sum(heights) / len(heights)
@@ -244,17 +258,18 @@ class Terrain(NamedTuple):
         tells = rough > 0.0 or (calm and even)
         barred = 0.0 if anew else max(0.0, self.barred - way)
         met = -1 if self.high < 0 or not 0.0 <= swung[self.high] <= 1.0 else self.high
-        lifted, changes = self._in_swings(swung, touches)
+        lifted, changes, changed = self._in_swings(swung, touches)
         for i, (foot, share, touch) in enumerate(zip(feet, swung, touches, strict=True)):
             if tells and touch and lifted[i] and SCUFFING[0] < share < SCUFFING[1]:
                 height = dot(normal, foot) - mean
                 if height > CLIMBED * leg_length:
-                    if changes[i] <= FLICKERS:
+                    if changes[i] <= FLICKERS or share - changed[i] > STEADY:
                         barred, met = FADES * leg_length, i
                 elif height > CLEAR_OF_GROUND * leg_length and not barred:
                     rough = max(rough, height + MARGIN * leg_length)
-        if barred and not high - middle > STEP * leg_length:
-            rough = 0.0
+        if barred:
+            rough = max(self.rough * exp(-RELAXES * dt), (high - low) * (
+                high - low > UNEVEN * leg_length))
         hangs = not anew and in_turn and (calm or self.gaps) and any(
             not (touch or 0.0 <= share <= 1.0)
             and middle - dot(normal, foot) > HOLLOW * leg_length
@@ -271,7 +286,7 @@ class Terrain(NamedTuple):
             for last, rest, share, touch in zip(self.lowered, rests, swung, touches, strict=True))
         terrain = Terrain(
             rough, gaps, footholds, place, lowered if any(lowered) else LEVEL_FEET, walked,
-            barred, met, lifted, tuple(touches), changes)
+            barred, met, lifted, tuple(touches), changes, changed)
         return terrain, terrain.lowered if rough == 0.0 else tuple(
             height - mean - RAISED * rough + down - (
                 SEARCHED * leg_length if share > 1.0 and not (touch or rest) else 0.0)
@@ -279,16 +294,17 @@ class Terrain(NamedTuple):
                 heights, lowered, rests, swung, touches, strict=True))
 
     def _in_swings(self, swung: Sequence[float], touches: Sequence[bool]
-                   ) -> tuple[tuple[bool, ...], tuple[int, ...]]:
-        """Which feet have been free in the swing that they are in, and how often their sensors
-        have changed their mind in it.
-        """
+                   ) -> tuple[tuple[bool, ...], tuple[int, ...], tuple[float, ...]]:
+        """``lifted``, ``changes`` and ``changed``."""
         swinging = [0.0 <= share <= 1.0 for share in swung]
+        turned = [touch != last for touch, last in zip(touches, self.touched, strict=True)]
         return tuple(
             swings and (before or not touch)
             for before, swings, touch in zip(self.lifted, swinging, touches, strict=True)), tuple(
-            before + (touch != last) if swings else 0 for before, last, swings, touch
-            in zip(self.changes, self.touched, swinging, touches, strict=True))
+            before + now if swings else 0 for before, now, swings
+            in zip(self.changes, turned, swinging, strict=True)), tuple(
+            share if now else before
+            for before, now, share in zip(self.changed, turned, swung, strict=True))
 
 
 def contacts(state: RobotState, forces: Array, rests: Sequence[bool],

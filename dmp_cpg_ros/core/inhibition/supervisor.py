@@ -198,8 +198,8 @@ class GaitSupervisor:
     def _balancing(self, state: SupervisorState, margins: Sequence[float] | None,
                    network: GaitNetwork, progress: Progress, r: Array, most: float, dt: float
                    ) -> SupervisorState:
-        """Follow less of the command, and step faster, while the body is disturbed; less also
-        while the gait changes. Over rough ground feet need time; over gaps no body slows down.
+        """Follow less of the command, and step faster, while the body is disturbed; less while the
+        gait changes. Feet need time on rough ground, but after a push; over gaps none slows down.
         """
         least = CLIMBING if progress.rough else STRIDING if progress.gaps else LEAST
         p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.wide)
@@ -207,7 +207,7 @@ class GaitSupervisor:
         share, most = 1.0, min(most, state.block.most)
         if not (predicted or state.push.acts):
             share = followed_share(state.share, left if p.caution else None, dt, most, least)
-        free = p.step_timing and (state.push.acts or not predicted) and not progress.rough
+        free = p.step_timing and (state.push.acts or not (predicted or progress.rough))
         fastest = fastest_lately(state.fastest, r, dt)
         quickness = quickened(state.quickness, left if free else None, dt, quickest(
             network, state.quickness, r, progress.velocity, fastest))

@@ -17,6 +17,11 @@ by the next ones: for ``POST_STUMBLE_SWINGS`` swings the foot steps as high from
 that trips in one of them has met something higher, and steps higher again, up to ``HIGHEST``
 lifts.
 
+Over rough ground a foot may be held up again when it goes on: it meets the edge. It yields again,
+along its way only, and comes down. What holds it is in front of it while it is farther behind its
+target than above it, for friction lifts less than it holds back; beyond that it stands there, and
+has landed. One that was driven on against an edge threw the body up with twice its weight.
+
 A foot that comes down on something high stands still as well, above its target. It yields, too,
 and its path comes back to the height of the others over the stance, so that it does not throw the
 body up.
@@ -205,7 +210,7 @@ def stumble_step(before: Stumble, progress: SwingProgress | None, lift: float, t
         Time since the last tick [s].
     rough : bool
         Whether the ground is known to be uneven: a foot that touches something in the second half
-        of its swing, and is not held up on its way, has then landed.
+        of its swing, has not tripped in it and is not held up, has then landed.
 
     Returns
     -------
@@ -234,15 +239,15 @@ def stumble_step(before: Stumble, progress: SwingProgress | None, lift: float, t
         progress.swung > (TOUCHED if progress.touches else TOUCHING)
         and sinking < SETTLED * progress.sinking_speed
         and above > threshold + late * max(0.0, last.target_level - progress.target_level)) or (
-        rough and progress.touches and progress.swung > (HIGH if tripped else TOUCHED))
-    held_up = rough and progress.target_place - progress.place > threshold
+        rough and progress.touches and not tripped and progress.swung > TOUCHED)
+    held_up = rough and progress.target_place - progress.place > max(threshold, above)
     landed = before.landed or (came_down and not held_up)
     height, up = before.height, before.up or before.height >= RISEN * lift
     if tripped and not landed and (not up or progress.swung < HIGH):
         height = lift + (height - lift) * exp(-QUICKNESS * dt)
     elif not landed:
         height = max(0.0, height - GENTLENESS * lift * dt)
-    compliant = landed or (tripped and not up)
+    compliant = landed or (tripped and not (up and not (held_up and progress.touches)))
     return Stumble(tripped, landed, compliant, before.post_stumble, up, height,
                    (height - before.height) / dt, progress, speed, sinking, before.lifts)
 

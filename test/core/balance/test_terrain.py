@@ -27,8 +27,10 @@ from dmp_cpg_ros.core.balance.terrain import (
     LOWEST,
     MARGIN,
     RAISED,
+    RELAXES,
     SEARCHED,
     SINKING,
+    STEADY,
     STEP,
     UNEVEN,
     Terrain,
@@ -52,11 +54,11 @@ heights = st.lists(st.floats(-0.5, 0.5), min_size=4, max_size=4)
 def felt(z: Sequence[float], terrain: Terrain = NOTHING, x: float = 0.0,
          swung: Sequence[float] = (STANDING,) * 4, touches: Sequence[bool] = (True,) * 4,
          calm: bool = True, in_turn: bool = True, rests: Sequence[bool] = (False,) * 4,
-         quiet_s: float = 0.0) -> tuple[Terrain, tuple[float, ...]]:
+         quiet_s: float = 0.0, dt: float = 0.0) -> tuple[Terrain, tuple[float, ...]]:
     feet: list[Triple] = [
         (x + a, b, up) for (a, b), up in zip(PLACES, z, strict=True)]
     return terrain.felt(
-        (x, 0.0, 0.3), feet, UP, swung, touches, LENGTH, calm, in_turn, rests, quiet_s)
+        (x, 0.0, 0.3), feet, UP, swung, touches, LENGTH, calm, in_turn, rests, quiet_s, dt)
 
 
 @given(heights)
@@ -167,6 +169,35 @@ def test_what_a_foot_meets_too_high_is_not_climbed(
     assert on_top.rough > 0.0
     away, _ = felt((0.0,) * 4, down._replace(barred=0.01), x=0.06)
     assert away.barred == 0.0
+
+
+@pytest.mark.parametrize('steady', [0.5 * STEADY, 1.5 * STEADY])
+def test_a_foot_that_was_shaken_is_believed_when_it_has_rested(steady: float) -> None:
+    shaken = lifted(felt((0.0,) * 4)[0])._replace(
+        changes=(FLICKERS + 3, 0, 0, 0), touched=(True,) * 4,
+        changed=(SWINGING - steady, 0.0, 0.0, 0.0))
+    met, _ = felt((1.5 * CLIMBED * LENGTH, 0.0, 0.0, 0.0), shaken,
+                  swung=(SWINGING, *(STANDING,) * 3))
+    assert (met.barred > 0.0) == (steady > STEADY)
+
+
+@pytest.mark.parametrize('rise', [-0.02, 0.03])
+def test_a_standing_foot_that_the_body_lifts_is_no_higher_foothold(rise: float) -> None:
+    terrain = felt((0.1, 0.0, 0.0, 0.0))[0]
+    tilted, _ = felt((0.1, 0.0, 0.0, rise), terrain, touches=(True, True, True, False))
+    assert tilted.footholds[3][2] == min(0.0, rise)
+    stands, _ = felt((0.1, 0.0, 0.0, rise), terrain)
+    assert stands.footholds[3][2] == rise
+
+
+def test_before_an_obstacle_the_height_goes_to_what_feet_stand_on() -> None:
+    barred = felt((0.0,) * 4)[0]._replace(rough=0.5 * LENGTH, barred=FADES * LENGTH)
+    last = barred
+    for _ in range(1000):
+        now, _ = felt((0.3 * LENGTH, 0.0, 0.0, 0.0), last, dt=0.004)
+        assert now.rough >= last.rough * np.exp(-RELAXES * 0.004) - 1e-12
+        last = now
+    assert last.rough == pytest.approx(0.3 * LENGTH)
 
 
 @pytest.mark.parametrize('free', [False, True])

@@ -20,6 +20,7 @@ from dmp_cpg_ros.core.transformation.stumble import (
     LEAST_LIFT,
     POST_STUMBLE_SWINGS,
     Stumble,
+    SwingProgress,
     compliant_offset_rate,
     lift_left,
     stumble_step,
@@ -222,6 +223,21 @@ def landing_tick(force: float) -> int:
 def test_the_leg_takes_the_force_of_its_foot_for_a_touch() -> None:
     touch = leg_and_state(0.13)[0].touch_force
     assert landing_tick(1.1 * touch) < landing_tick(0.0) == landing_tick(0.9 * touch) < 500
+
+
+@pytest.mark.parametrize(('behind', 'above'), [(0.03, 0.0), (0.03, 0.02), (0.02, 0.03)])
+@pytest.mark.parametrize('rough', [False, True])
+def test_a_foot_that_went_on_yields_again_at_an_edge_and_stands_where_it_is_held_from_below(
+        behind: float, above: float, rough: bool) -> None:
+    """Friction lifts less than it holds back."""
+    held = SwingProgress(0.7, 0.0, above, behind, 0.0, 0.5, 1.0, 1.0, True)
+    went_on = Stumble(tripped=True, up=True, progress=held)
+    now = stumble_step(went_on, held, LIFT, THRESHOLD, TICK, rough)
+    if rough:
+        assert now.landed == (above > behind)
+        assert now.compliant
+    elif above <= THRESHOLD:
+        assert not now.compliant
 
 
 @pytest.mark.parametrize('rough', [0.0, 0.02, 0.1, 0.5])
