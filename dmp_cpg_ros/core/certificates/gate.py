@@ -44,9 +44,10 @@ _CAPTURING = frozenset(('rho', 'radius', 'coupling_gain', 'coupling_graph', 'inh
                         'region_radius', 'inhibited_legs'))
 """Parameters that decide which set inhibition holds the legs in."""
 
-_WHOLE_EFFORT, _CLAMP_EFFORT = 4, 2
-"""Of a whole certificate of one leg, and of the gain with which a set of voters stops the gait;
-from times of a processor that were measured.
+_WHOLE_EFFORT, _STOPPING_EFFORT, _WEAK_EFFORT = 4, 2, 1
+"""Of a whole certificate of one leg, of what a set of voters needs to stop a network and what it
+does to it, and of the gain up to which a smaller one cannot; from times of a processor that were
+measured.
 """
 
 
@@ -114,9 +115,10 @@ class Running:
             kinds = eligible = len(set(degrees(
                 self.parameters.canonical.coupling_graph, len(LEGS))))
         if self.parameters.voting.voting and (not among or among in VOTE_ROWS):
-            networks = self.networks
-            votes = (_CLAMP_EFFORT + len(networks)) * len(
-                different_voters(networks[0].system, self.parameters.voting.majority))
+            networks, majority = self.networks, self.parameters.voting.majority
+            enough, fewer = (len(different_voters(networks[0].system, count))
+                             for count in (majority, majority - 1))
+            votes = len(networks) * (_STOPPING_EFFORT * enough + _WEAK_EFFORT * fewer)
         if among in VOTE_ROWS:
             return votes
         return votes + eligible + kinds * (1 if among in OSCILLATOR_ROWS else _WHOLE_EFFORT)

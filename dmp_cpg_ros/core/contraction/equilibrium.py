@@ -79,12 +79,19 @@ def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array, gains: 
     return equilibrium_up_to(system, omega, gains, known, share)[0]
 
 
-def stable_equilibrium_near(system: CanonicalSystem, omega: float | Array, gains: Array,
-                            near: Array) -> InhibitedEquilibrium | None:
-    """Stable equilibrium that Newton's method finds from a state (N, 2); None: it finds none."""
+def equilibrium_near(system: CanonicalSystem, omega: float | Array, gains: Array,
+                     near: Array) -> InhibitedEquilibrium | None:
+    """Equilibrium that Newton's method finds from another one's state (N, 2), on the same branch:
+    no real eigenvalue passed 0, as at a fold, though a pair may have (Hopf); None: it finds none.
+    """
     x = _newton(system, near, np.asarray(omega), gains)
-    found = None if x is None else _described(system, x, omega, gains)
-    return found if found is not None and found.slowest_rate > 0.0 else None
+    if x is None:
+        return None
+    found = _described(system, x, omega, gains)
+    if found.slowest_rate > 0.0:
+        return found
+    rates = np.linalg.eigvals(system.jacobian(x, omega, gains))
+    return None if (rates.real[rates.imag == 0.0] >= 0.0).any() else found
 
 
 def equilibrium_up_to(system: CanonicalSystem, omega: float | Array, gains: Array,

@@ -17,8 +17,8 @@ from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.equilibrium import (
     InhibitedEquilibrium,
+    equilibrium_near,
     equilibrium_up_to,
-    stable_equilibrium_near,
 )
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, NONE, inhibited_contraction
 from dmp_cpg_ros.core.contraction.voting import (
@@ -103,16 +103,14 @@ def rest_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequen
     def room(alpha: float) -> float:
         nonlocal rest
         gains = _votes(system, voters, alpha)
-        found = None if rest is None else stable_equilibrium_near(
-            system, omega, gains, rest.state)
+        found = None if rest is None else equilibrium_near(system, omega, gains, rest.state)
         if found is None:
             found, share = equilibrium_up_to(system, omega, gains)
             if found is None:                     # which needs ω/share, or about α/share
                 return log(share) if share > 0.0 else -np.inf
-        stable = found.slowest_rate / alpha                       # it passes 0 at a threshold
+        rest, stable = found, found.slowest_rate / alpha          # it passes 0 at a threshold
         if not stable > 0.0:
             return stable if stable < 0.0 else -np.inf
-        rest = found
         farthest = float(rest.distance[gains > 0.0].max())
         return min(stable, log(region_radius / farthest)) if farthest > 0.0 else stable
 
@@ -123,7 +121,7 @@ def rest_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequen
     if rest is not None:
         low = _at_the_edge(system, omega, voters, rest, first, region_radius)
         low /= 1.0 + 0.5 * _PRECISION
-        if low < first and room(low) < 0.0 <= room(low * (1.0 + _PRECISION)):
+        if 0.0 < low < first and room(low) < 0.0 <= room(low * (1.0 + _PRECISION)):
             return low
     return _threshold(room, scale, highest=known)[0]
 

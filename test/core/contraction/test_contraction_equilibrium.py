@@ -14,9 +14,9 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.equilibrium import (
+    equilibrium_near,
     equilibrium_up_to,
     inhibited_equilibrium,
-    stable_equilibrium_near,
 )
 
 
@@ -53,9 +53,23 @@ def test_from_a_rest_nearby_it_is_the_one_that_grows_out_of_the_targets(
     gains[node] = 600.0
     nearby = inhibited_equilibrium(network, omega, other * gains)
     assume(nearby is not None and nearby.slowest_rate > 0.0)
-    near = stable_equilibrium_near(network, omega, gains, nearby.state)
+    near = equilibrium_near(network, omega, gains, nearby.state)
     grown = inhibited_equilibrium(network, omega, gains)
     assert near is None or np.abs(near.state - grown.state).max() < 1e-8
+
+
+@pytest.mark.parametrize('omega', [15.0, 30.0])
+def test_a_rest_is_followed_through_where_a_pair_of_its_eigenvalues_passes_zero(
+        omega: float) -> None:
+    network = system('all_to_all', 100.0)
+    gains = np.array([95.0, 95.0, 0.0, 0.0])
+    rest = inhibited_equilibrium(network, omega, gains)
+    for share in 0.8 ** np.arange(1, 13):
+        found = equilibrium_near(network, omega, share * gains, rest.state)
+        grown = inhibited_equilibrium(network, omega, share * gains)
+        assert np.abs(found.state - grown.state).max() < 1e-8
+        rest = found
+    assert rest.slowest_rate < 0.0
 
 
 @pytest.mark.parametrize('omega', [2.0, 5.0, 10.0, 20.0])
