@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -29,7 +29,8 @@ import numpy as np
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.coupling import TOPOLOGIES
-from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.studies import output
@@ -217,9 +218,9 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
                 asked = value
                 loop.command(*asked)
             elif what == 'gait':
-                loop.change_gait(value)
+                _refused(loop, {'gait': value})
             elif what == 'set':
-                refused = bool(loop.change(value))
+                refused = _refused(loop, value)
                 outcome.refused, outcome.changed = (
                     outcome.refused + refused, outcome.changed + (not refused))
                 open_stop = open_stop if refused else None
@@ -255,6 +256,16 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
                 f'({v_x:.2f}, {v_y:.2f}) m/s, {gamma:.2f} rad/s')
             break
     return outcome
+
+
+def _refused(loop: WalkingLoop, values: Mapping[str, Any]) -> bool:
+    """Ask for a change, of which some are impossible, as of the gait while it is chosen by speed;
+    whether it is refused.
+    """
+    try:
+        return bool(loop.change(values))
+    except ParameterError:
+        return True
 
 
 def touches_itself(model: mujoco.MjModel, data: mujoco.MjData) -> bool:

@@ -167,6 +167,11 @@ def test_a_robot_that_lies_down_and_gets_other_parameters_meanwhile_has_not_fall
     assert outcome.fell == '' and outcome.changed > 3 and not outcome.late
 
 
+def test_gaits_may_be_asked_for_while_they_are_chosen_by_speed() -> None:
+    """Which is refused, and ended the study."""
+    assert trial(3158, 2.2, changes=True).fell == ''
+
+
 @pytest.mark.parametrize(('apart', 'touches'), [(0.3, False), (0.15, True)])
 def test_legs_that_kick_each_other_are_told_from_feet_on_the_ground(
         apart: float, touches: bool) -> None:
