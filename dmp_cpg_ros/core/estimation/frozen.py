@@ -12,7 +12,10 @@ the mean velocity times t, but for what accelerations change meanwhile, which go
 that between the stamps of the joints, which are not those of the ticks where messages come late or
 get lost, and what is older than what was heard is not judged. A leg with a joint that breaks this
 is doubted. Where all legs do at once it is what carries the readings
-that fails, and nothing of it is believed.
+that fails, and nothing of it is believed. What comes late does so too, but only the legs that move
+fast jump by enough as it begins: who tells to the last bit what it has told before, while another
+one jumps, jumps back as well. To believe those that stand, of a tenth of a second ago, and not
+those that swing, swung heavy robots up until they tipped over.
 
 What lasts is no proof: an offset that comes in one tick is told as steadily as the truth. A leg is
 believed again once for a while it has not jumped and either its jumps have cancelled each other,
@@ -55,6 +58,9 @@ MANY, CALM_NS = 3, 2_000_000_000
 """Ticks with jumps from which an encoder tells anything, and for how long it must not have jumped
 to be believed then [ns].
 """
+
+PAST_NS = 250_000_000
+"""How long what was told is known again [ns]."""
 
 ALIKE, USUAL_S = 0.075, 1.0
 """Distance of two mean angles within which they are the same [rad], and the time over which they
@@ -120,6 +126,8 @@ class SensorWatch:
         Mean angles while they were believed [rad].
     doubt : Doubt
         Which legs are not believed.
+    past : tuple of SensorReadings
+        Those of the ticks before, of ``PAST_NS``.
     """
 
     readings: SensorReadings
@@ -129,6 +137,7 @@ class SensorWatch:
     heard_ns: tuple[int, ...]
     usual: Array
     doubt: Doubt
+    past: tuple[SensorReadings, ...] = ()
 
 
 NEVER = (-1,) * (1 + 2 * N)
@@ -163,7 +172,9 @@ def without_frozen(watch: SensorWatch, readings: SensorReadings
         known - watch.usual)
     if any(doubt.legs):
         usual = np.where(np.repeat(doubt.legs, 3), watch.usual, usual)
-    return SensorWatch(told, since, known, until, heard, usual, doubt), passed
+    oldest, past = readings.time_ns - PAST_NS, (*watch.past, last)
+    past = past[1:] if past[0].time_ns < oldest else past
+    return SensorWatch(told, since, known, until, heard, usual, doubt, past), passed
 
 
 def _heard(watch: SensorWatch, readings: SensorReadings
@@ -191,7 +202,7 @@ def _in_doubt(watch: SensorWatch, readings: SensorReadings, jumps: dict[int, flo
     doubt, now, q = watch.doubt, readings.time_ns, readings.joint_position
     apart = np.zeros(3 * N)
     apart[list(jumps)] = list(jumps.values())
-    jump = (apart != 0.0).reshape(N, 3).any(axis=1)
+    jump = (apart != 0.0).reshape(N, 3).any(axis=1) | _told_before(watch, readings)
     at_once = doubt.all_at_once or bool(jump.all())
     jumped = np.where(jump, now, doubt.jumped_ns)
     since, slipped = 1e-9 * np.repeat(now - jumped, 3), doubt.slipped + apart
@@ -210,6 +221,16 @@ def _in_doubt(watch: SensorWatch, readings: SensorReadings, jumps: dict[int, flo
         return NOBODY
     return Doubt(tuple(legs.tolist()), at_once, count * legs, jumped, odd,
                  np.where(np.repeat(legs, 3), slipped, 0.0), mean)
+
+
+def _told_before(watch: SensorWatch, readings: SensorReadings) -> Array:
+    """Which legs of a robot that moves tell what they told before the last tick, (4,) bool."""
+    if not (watch.past and np.abs(np.nan_to_num(readings.joint_velocity)).max() > MOVING):
+        return np.zeros(N, bool)
+    told, *before = (np.stack((of.joint_position, of.joint_velocity)).reshape(2, N, 3)
+                     for of in (readings, watch.readings, *watch.past))
+    same = (np.array(before) == told).all(axis=(1, 3))  # (n, 4)
+    return np.asarray(same[1:].any(axis=0) & ~same[0])
 
 
 def _share(dt: float) -> float:

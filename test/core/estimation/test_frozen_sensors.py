@@ -227,6 +227,36 @@ def test_nothing_is_believed_of_what_makes_all_legs_jump_at_once() -> None:
         assert not (sound.imu_is_usable or any(sound.usable_legs) or any(sound.usable_contacts))
 
 
+@pytest.mark.parametrize('late', [(0, 1, 2, 3), (1,), (2, 3)])
+def test_legs_that_do_not_swing_are_late_too_as_one_that_does(late: tuple[int, ...]) -> None:
+    """Leg 2 swings fast, the others move slowly: by what is a tenth of a second late they do not
+    jump. Nothing is believed where all legs are late, and all is again some time after that; what
+    is late and does not swing cannot be told alone.
+    """
+    def at(k: int) -> SensorReadings:
+        told = readings(k)
+        swing(k, told)
+        for part in (told.joint_position, told.joint_velocity):
+            part[:6] *= 0.1
+            part[9:] *= 0.1
+        return told
+
+    def spoil(k: int, told: SensorReadings) -> None:
+        joints = np.repeat([1300 <= k < 1420 and leg in late for leg in range(4)], 3)
+        for name in ('joint_position', 'joint_velocity'):
+            getattr(told, name)[:] = np.where(
+                joints, getattr(at(max(k - 25, 0)), name), getattr(at(k), name))
+
+    passed = judged(spoil, 2200)
+    doubted = late if 2 in late else ()
+    for k, sound in enumerate(passed, 1):
+        if 1300 <= k < 1420:
+            assert sound.usable_legs == tuple(leg not in doubted for leg in range(4))
+            assert sound.imu_is_usable == all(sound.usable_contacts) == (len(doubted) < 4)
+        elif k < 1300 or k >= 1420 + CALM_NS // TICK_NS:
+            assert all(sound.usable_legs) and sound.imu_is_usable
+
+
 @pytest.mark.parametrize('every', [1, 2, 5])
 def test_joints_that_accelerate_as_hard_as_joints_can_are_believed(every: int) -> None:
     """Also with readings that come seldom, twice, or not at all for a while."""
