@@ -26,6 +26,7 @@ import numpy as np
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets, RobotState
+from dmp_cpg_ros.robot.drive_offsets import DriveOffsets
 from dmp_cpg_ros.robot.joint_drive import JointDrive
 
 MEMORY_S = 0.02
@@ -91,6 +92,8 @@ class DriveWatch:
     cuts : bool
         Whether lame legs are without power: drives that give anything are to be cut off, and a
         robot that only lies down with one of them is thrown over from its belly.
+    offsets : DriveOffsets
+        By how much drives are off.
     lame : tuple of str
         Legs that move without giving torque that is asked of them, or did lately; where they are
         cut off, also those that give torques that change wildly.
@@ -100,6 +103,7 @@ class DriveWatch:
         self._kp, self._kd = np.tile(description.kp, 4), np.tile(description.kd, 4)
         self._limit = np.concatenate([leg.torque_limit for leg in description.legs])
         self._damping = np.concatenate([leg.damping for leg in description.legs])
+        self.offsets = DriveOffsets(description)
         self._limited = JointDrive(description, 1, 1e-3).limited
         self._names = description.joint_names
         self._told: Array | None = None  # (3, 12)
@@ -137,12 +141,17 @@ class DriveWatch:
         if told is None or not 0 < after_ns <= LONGEST_NS:
             self._means = np.zeros_like(self._means)
             self._before.clear()
+            self.offsets.forget()
             return
         dt, q, q_dot = 1e-9 * after_ns, state.joint_position, state.joint_velocity
         news, given, fade = self._news, state.joint_effort / self._limit, exp(-dt / MEMORY_S)
         asked = self._asked(told[0] + dt * told[1] - q, told[2], self._goes, q_dot)
         if self.late_ns:
             asked[:] = self._nearest(given, asked, state)
+        if self.lame:
+            self.offsets.forget(self.lame)
+        else:
+            self.offsets.see(now, given, asked, q, told[0] + dt * told[1])
         news[:2], news[2], news[3] = asked, self._damping * q_dot / self._limit, given
         news[5:3:-1] = asked * asked
         news[6:8], news[8], news[9] = asked * given, given * given, q_dot * q_dot
@@ -156,6 +165,8 @@ class DriveWatch:
         failing = (much & (shared < FOLLOWS * power)).all(axis=0)
         if self.cuts and self.lame:
             failing |= np.repeat([leg in self.lame for leg in LEGS], len(JOINTS_OF_LEG))
+        if self.offsets.known:
+            failing |= self.offsets.offset != 0.0
         if failing.any():
             self._failed_ns = np.where(failing, now, self._failed_ns)
         elif not self.failing:
@@ -195,7 +206,10 @@ class DriveWatch:
         high = np.maximum(np.maximum(first, second), 0.0) + np.maximum(friction, 0.0)
         unasked = mean - np.minimum(np.maximum(mean, low), high)
         strange = (unasked * unasked).reshape(len(LEGS), -1).sum(axis=1)
-        self._strange_ns = np.where(strange > STRANGE * STRANGE, now, self._strange_ns)
+        strangely = strange > STRANGE * STRANGE
+        if self.offsets.known:  # what drives give that are off nobody asks for
+            strangely |= self.offsets.offset.reshape(len(LEGS), -1).any(axis=1)
+        self._strange_ns = np.where(strangely, now, self._strange_ns)
         limp = ((asked > MUCH * MUCH) & (np.maximum(reported, explained) < LIMP * asked)
                 & (moves > MOVES * MOVES) & (now - self._strange_ns > STRANGE_NS))
         followed = (np.maximum(means[6:8], 0.0) ** 2 / np.maximum(means[5:3:-1], 1e-9)).max(axis=0)

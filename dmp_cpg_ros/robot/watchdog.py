@@ -17,6 +17,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.clock import fresh
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.modes.falls import BodySense, FallParameters
 from dmp_cpg_ros.core.modes.motion_library import RISE, lying_posture, time_unit
 from dmp_cpg_ros.core.primitives.demonstration import minimum_jerk
@@ -230,6 +231,9 @@ class CommandWatchdog:
         self._given = targets.position.copy()
         self.leaving = self.fallback or self.leaving
         self.drives.tell(state.time_ns, targets)
+        if self.drives.offsets.known:
+            return replace_unchecked(
+                targets, position=targets.position - self.drives.offsets.offset)
         return targets
 
     def _yielding(self, targets: JointTargets, state: RobotState) -> JointTargets:
