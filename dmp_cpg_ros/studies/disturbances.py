@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import pi
+from math import pi, sqrt
 
 import numpy as np
 
@@ -22,8 +22,10 @@ from dmp_cpg_ros.studies.walking_trials import Values
 FRICTION, PAYLOAD = (0.4, 0.6), (0.0, 0.3)
 """Of the floor; mass in the trunk as a share of the robot's."""
 
-DEGREES, WAVE, BUMPS = (0.0, 5.0), (1.5, 6.0), (0.0, 0.03)
-"""Mean slope of hills [deg], length of their waves and height of bumps on them [m]."""
+DEGREES, WAVE, BUMPS, LONGEST_WAVE = (0.0, 5.0), (1.5, 6.0), (0.0, 0.03), 10.0
+"""Mean slope of hills [deg], length of their waves and height of bumps on them, for the package's
+own robot, and the longest waves [m].
+"""
 
 PUSHES, SPEED_CHANGE = (3.0, 8.0), (0.0, 0.6)
 """Times between pushes [s], and by how much they would change the speed of a free body [m/s]."""
@@ -90,15 +92,18 @@ class Disturbance:
     told: dict[str, float] = field(default_factory=dict)
 
     @classmethod
-    def drawn(cls, seed: int) -> Disturbance:
-        """Draw one: each kind with a probability of a half."""
+    def drawn(cls, seed: int, size: float = 1.0) -> Disturbance:
+        """Draw one, for a robot of so many times the lengths of the package's own: each kind with
+        a probability of a half.
+        """
         rng = _rngs(seed)[0]
         slips, carries, rough, pushed = (rng.random(4) < 0.5).tolist()
         friction, payload, degrees, bumps = (
             float(rng.uniform(*of)) for of in (FRICTION, PAYLOAD, DEGREES, BUMPS))
         ground = {'friction': friction} if slips else {}
         values = {'payload': payload} if carries else {}
-        hills = {'degrees': degrees, 'bumps': bumps, 'wave': float(rng.uniform(*WAVE))}
+        hills = {'degrees': degrees, 'bumps': size * bumps,
+                 'wave': min(size * float(rng.uniform(*WAVE)), LONGEST_WAVE)}
         told = {**ground, **values, **(hills if rough else {})}
         return cls(Wilderness(**ground, **hills, seed=seed) if rough else World(**ground),
                    tuple(values.items()), pushed, told)
@@ -107,13 +112,15 @@ class Disturbance:
 UNDISTURBED = Disturbance()
 
 
-def pushes(seed: int, seconds: float) -> list[tuple[float, str, tuple[float, float, float]]]:
-    """Pushes of one walk, as events of time, ``push``, and speed change [m/s], direction in the
-    base frame [rad] and duration [s]; those of a longer one begin with them.
+def pushes(seed: int, seconds: float, size: float = 1.0
+           ) -> list[tuple[float, str, tuple[float, float, float]]]:
+    """Pushes of one walk of a robot of so many times the package's own lengths, as events of time,
+    ``push``, and speed change [m/s], direction in the base frame [rad] and duration [s]; those of
+    a longer one begin with them.
     """
     rng, at, events = _rngs(seed)[1], 0.0, []
     while (at := at + float(rng.uniform(*PUSHES))) < seconds:
-        events.append((at, 'push', (float(rng.uniform(*SPEED_CHANGE)),
+        events.append((at, 'push', (sqrt(size) * float(rng.uniform(*SPEED_CHANGE)),
                                     float(rng.uniform(0.0, 2.0 * pi)),
                                     round(float(rng.uniform(*PUSH_DURATIONS)), 2))))
     return events

@@ -176,7 +176,7 @@ def choice(rng: np.random.Generator, gaits: Sequence[str]) -> dict[str, Any]:
 
 def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[str] = GAITS,
           changes: bool = False, auto_gait: bool = False, disturbed: bool = False,
-          rate: float = 0.0) -> Outcome:
+          rate: float = 0.0, size: float = 1.0) -> Outcome:
     """Walk one course, from a gait that its seed draws.
 
     Parameters
@@ -197,18 +197,20 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
         Whether the robot is disturbed meanwhile.
     rate : float
         Of the control [Hz]; that of the package's parameter file with 0.
+    size : float
+        Of disturbances: lengths, in those of the package's own robot.
     """
     first = gaits[seed % len(gaits)]
     p = suite_of(robot=robot).parameters.reference
     limits = (p.max_speed, p.max_lateral_speed, p.max_turn_rate)
-    disturbance = Disturbance.drawn(seed) if disturbed else UNDISTURBED
+    disturbance = Disturbance.drawn(seed, size) if disturbed else UNDISTURBED
     run = Walk(first, robot, disturbance.world, seed + 1,
                (*disturbance.values, *((('control_rate', rate),) if rate else ())))
     outcome = Outcome(seed, disturbed=disturbance.told)
     loop, asked, open_stop = run.loop, (0.0, 0.0, 0.0), None
     events = course(seed, seconds, limits, gaits, changes, auto_gait)
     if disturbance.pushes:
-        events = sorted(events + pushes(seed, seconds), key=lambda event: event[0])
+        events = sorted(events + pushes(seed, seconds, size), key=lambda event: event[0])
     foot_speed = loop.canonical.scale.foot_speed
     for k in range(round(seconds / run.tick_s)):
         stops = False

@@ -12,7 +12,8 @@ import pytest
 pytest.importorskip('mujoco')
 
 from dmp_cpg_ros.robot.model_inspection import inspect_model
-from dmp_cpg_ros.studies.random_robots import GAITS, Shape, trial
+from dmp_cpg_ros.studies.disturbances import Disturbance, pushes
+from dmp_cpg_ros.studies.random_robots import ALSO, GAITS, Shape, trial
 
 SEEDS = range(12)
 
@@ -47,3 +48,19 @@ def test_a_drawn_robot_walks_at_the_speed_that_is_asked_and_stops_as_predicted()
     assert not outcome.wrong
     assert [stop[0] for stop in outcome.stops] == list(GAITS)
     assert max(outcome.error.values()) < 0.02
+
+
+def test_disturbances_of_a_drawn_robot_are_of_its_size() -> None:
+    own, small = (Disturbance.drawn(6, size).told for size in (1.0, 0.5))
+    assert own.keys() >= {'degrees', 'bumps', 'wave'}
+    assert {name: small[name] / own[name] for name in own} == pytest.approx(
+        {name: 0.5 if name in ('bumps', 'wave') else 1.0 for name in own})
+    for (_, _, (speed, *same)), (_, _, (slower, *other)) in zip(
+            pushes(6, 30.0), pushes(6, 30.0, 0.25), strict=True):
+        assert slower == pytest.approx(0.5 * speed) and other == same
+
+
+@pytest.mark.parametrize('only', ALSO)
+def test_a_drawn_robot_stays_up_whatever_else_happens(only: str) -> None:
+    outcome = trial(303, 2.5, only)
+    assert not outcome.wrong and outcome.course.seconds > 2.4
