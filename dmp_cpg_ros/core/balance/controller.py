@@ -34,8 +34,8 @@ from dmp_cpg_ros.core.balance.terrain import (
     Terrain,
     contacts,
 )
-from dmp_cpg_ros.core.balance.unfelt import as_planned
-from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
+from dmp_cpg_ros.core.balance.unfelt import as_planned, borne_by_others
+from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
 from dmp_cpg_ros.core.gait.contact_feedback import believed, quarter_weight
@@ -216,7 +216,7 @@ class PostureController:
             dt)
         return PostureState(stride.activity, integral, plan, offset, terrain), PostureFeedback(
             self._torque(body, legs, feet, stride, planned, self._bounce(gait, stride),
-                         acceleration),
+                         acceleration, terrain.empty),
             self._shift(stride, gait, plan.expected, measured, planned, beside, R_ground_base,
                         level if terrain.barred else LEVEL_FEET),
             np.array(self.placement.drift(
@@ -335,15 +335,15 @@ class PostureController:
         return virtual_model.LateralPlan(*(share * value for value in sway))
 
     def _torque(self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
-                stride: Stride, r: Triple, bounce: Bounce, acceleration: Pair) -> Array:
+                stride: Stride, r: Triple, bounce: Bounce, acceleration: Pair,
+                empty: Sequence[bool]) -> Array:
         """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
         force, moment = self.model.wrench(self.parameters, body, r, bounce, acceleration)
-        forces = distribute(
-            force, moment, feet, stride.load, self.parameters.friction,
+        forces = borne_by_others(
+            force, moment, feet, stride.load, empty, self.parameters.friction,
             LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
-        torques: list[float] = []
-        for on_foot, (_, J) in zip(forces, legs, strict=True):
-            torques += vec3.transposed_times(
-                J, vec3.transposed_times(body.R_ground_base, on_foot))
+        torques = [torque for on_foot, (_, J) in zip(forces, legs, strict=True)
+                   for torque in vec3.transposed_times(
+                       J, vec3.transposed_times(body.R_ground_base, on_foot))]
         return np.array([clamped(-torque, -most, most) for torque, most in zip(
             torques, self._torque_limit, strict=True)])

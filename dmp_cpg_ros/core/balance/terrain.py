@@ -45,8 +45,8 @@ feet come down where the ground was, and ρ goes to what footholds differ by, at
 **Gaps.** A foot that is to stand, touches nothing, and is lower than the median of all footholds
 by more than ``HOLLOW`` l is in a gap. For the next ``FADES`` l the body does not follow less of
 its command because of it: it would fall over the leg that does not bear, and slow feet step into
-every gap. Only a body that may tell the first step finds a first gap, and only in a gait whose
-legs step one after the other: two legs of a trot bear too short for that.
+every gap. Where ρ is 0 the others bear for one that is deeper than ``DEEP`` l. Only a calm body
+finds a first gap, and only in a gait whose legs step in turn: two of a trot bear too short.
 
 **At rest.** A leg that is held where the ground is lower than the plane through the others hangs,
 and stays so. A foot of a resting leg that touches nothing while ``STANDING`` others do goes down,
@@ -80,8 +80,10 @@ ROLLING = 0.17
 SLOW = 0.5
 """Share of a gait's highest speed below which it may, of the reference and of the body."""
 
-HOLLOW = 0.05
-"""How deep a foot without ground hangs in a gap, in lengths of the leg."""
+HOLLOW, DEEP = 0.05, 0.1
+"""How deep a foot without ground hangs in a gap, and from where it is not counted on (those that
+find ground on hills hang by less), in lengths of the leg.
+"""
 
 SCUFFING = (0.25, 0.8)
 """Shares of the swing between which a foot that touches something has met an obstacle."""
@@ -134,21 +136,18 @@ leg; no further than it can reach.
 """
 
 QUIET = 0.05
-"""Speed of a body below which its feet may go down, as a share of √(g l): one that is pushed lifts
-feet that are to find the same ground again.
-"""
+"""Share of √(g l) of a body's speed below which its feet may go down: a pushed one lifts them."""
 
-SINKING = 0.3
-"""Speed at which a foot goes down then, in lengths of the leg per second."""
+SINKING, LOWEST = 0.3, 0.1
+"""Speed at which a foot that hangs at rest goes down, and how far, in lengths of the leg [1/s]."""
 
 STANDING = 2
 """Feet on which a robot stands whose others hang; one that is held up has none."""
 
-LOWEST = 0.1
-"""How far a foot goes down that hangs at rest, in lengths of the leg."""
-
 LEVEL_FEET: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 """Heights of feet that stand in the plane [m]."""
+
+NO_FOOT = (False,) * 4
 
 
 class Terrain(NamedTuple):
@@ -172,14 +171,12 @@ class Terrain(NamedTuple):
         For how much more way an obstacle that is not climbed is counted on [m].
     high : int
         Place of the leg that has met one in this swing; −1: none has.
-    lifted : tuple of four bool
-        Which feet have been free in the swing that they are in.
-    touched : tuple of four bool
-        Which feet touched something at the last tick.
-    changes : tuple of four int
-        How often that has changed in the swing that a foot is in.
-    changed : tuple of four floats
-        Shares of the swing at which it did last.
+    lifted, touched : tuple of four bool
+        Which feet have been free in the swing they are in, and touched something at the last tick.
+    changes, changed : tuple of four int, tuple of four floats
+        How often that has changed in the swing a foot is in, and share of it at which it did last.
+    empty : tuple of four bool
+        Which feet hang so deep in a gap that others bear for them.
     """
 
     rough: float = 0.0
@@ -190,10 +187,11 @@ class Terrain(NamedTuple):
     walked: bool = False
     barred: float = 0.0
     high: int = -1
-    lifted: tuple[bool, ...] = (False,) * 4
-    touched: tuple[bool, ...] = (False,) * 4
+    lifted: tuple[bool, ...] = NO_FOOT
+    touched: tuple[bool, ...] = NO_FOOT
     changes: tuple[int, ...] = (0,) * 4
     changed: tuple[float, ...] = (0.0,) * 4
+    empty: tuple[bool, ...] = NO_FOOT
 
     @property
     def followed(self) -> float:
@@ -270,10 +268,11 @@ class Terrain(NamedTuple):
         if barred:
             rough = max(self.rough * exp(-RELAXES * dt), (high - low) * (
                 high - low > UNEVEN * leg_length))
-        hangs = not anew and in_turn and (calm or self.gaps) and any(
-            not (touch or 0.0 <= share <= 1.0)
-            and middle - dot(normal, foot) > HOLLOW * leg_length
+        empty, deep = (tuple(
+            not (touch or 0.0 <= share <= 1.0) and middle - dot(normal, foot) > below * leg_length
             for foot, share, touch in zip(feet, swung, touches, strict=True))
+            for below in (HOLLOW, DEEP))
+        hangs = not anew and in_turn and (calm or self.gaps) and any(empty)
         gaps = FADES * leg_length if hangs else 0.0 if anew else max(0.0, self.gaps - way)
         rough = min(rough, HIGHEST * leg_length) if rough > FORGOTTEN * leg_length else 0.0
         walked = self.walked or any(
@@ -286,7 +285,8 @@ class Terrain(NamedTuple):
             for last, rest, share, touch in zip(self.lowered, rests, swung, touches, strict=True))
         terrain = Terrain(
             rough, gaps, footholds, place, lowered if any(lowered) else LEVEL_FEET, walked,
-            barred, met, lifted, tuple(touches), changes, changed)
+            barred, met, lifted, tuple(touches), changes, changed,
+            deep if hangs and rough == 0.0 else NO_FOOT)
         return terrain, terrain.lowered if rough == 0.0 else tuple(
             height - mean - RAISED * rough + down - (
                 SEARCHED * leg_length if share > 1.0 and not (touch or rest) else 0.0)

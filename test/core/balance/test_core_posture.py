@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
 from dmp_cpg_ros.core.balance.corrections import MassOffset, VelocityCorrection
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
+from dmp_cpg_ros.core.balance.unfelt import borne_by_others
 from dmp_cpg_ros.core.balance.virtual_model import REGULARISATION, distribute
 from dmp_cpg_ros.core.estimation.leg_odometry import normal_in_world
 from dmp_cpg_ros.core.maths.rotations import turned
@@ -91,6 +92,23 @@ def test_forces_are_those_of_the_damped_least_squares(load: np.ndarray, seed: in
                     & (np.hypot(*expected[:, :2].T) < 100.0 * expected[:, 2]) | (load == 0.0))
     if inside:
         np.testing.assert_allclose(found, expected, atol=1e-7 * WEIGHT)
+
+
+@given(push=st.tuples(*[st.floats(-5.0, 5.0)] * 2), lift=st.floats(0.8, 1.3),
+       gap=st.sampled_from([0, 1, 2, 3]))
+def test_what_a_foot_in_a_gap_does_not_bear_the_others_do(
+        push: tuple[float, ...], lift: float, gap: int) -> None:
+    wrench, load = np.array((*push, lift * WEIGHT, 0.0, 0.0, 0.0)), np.ones(4)
+    empty = [leg == gap for leg in range(4)]
+    arguments = (triple(wrench[:3].tolist()), (0.0, 0.0, 0.0),
+                 [triple(foot) for foot in FEET.tolist()], load.tolist())
+    forces = np.array(borne_by_others(*arguments, empty, 0.8, LARGEST))
+    planned = shared(wrench, FEET, load, 0.8)
+    assert forces[gap] == pytest.approx(planned[gap])   # it presses on, and finds ground
+    others = np.delete(forces, gap, axis=0)
+    assert others[:, 2].sum() == pytest.approx(wrench[2], rel=0.1)
+    on_all = borne_by_others(*arguments, [False] * 4, 0.8, LARGEST)
+    assert np.array_equal(np.array(on_all), planned)
 
 
 def test_without_load_there_are_no_forces() -> None:

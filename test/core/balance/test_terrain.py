@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.balance.terrain import (
     CLEAR_OF_GROUND,
     CLIMBED,
+    DEEP,
     FADES,
     FLICKERS,
     FOLLOWED,
@@ -249,9 +250,15 @@ def test_foot_without_ground_finds_a_gap(
     arguments = {'swung': (swung, *[STANDING] * 3), 'touches': (touches, True, True, True)}
     found, level = felt(low, stood, **arguments)
     assert (found.gaps > 0.0) == finds and not found.rough and level is LEVEL_FEET
+    assert not any(found.empty)   # it may find ground yet
+    low = (-(DEEP + 0.2 * HOLLOW) * LENGTH, 0.0, 0.0, 0.0) if finds else low
+    deeper, _ = felt(low, stood, **arguments)
+    assert deeper.empty == (finds, False, False, False)
+    rough, _ = felt(low, stood._replace(rough=HIGHEST * LENGTH), **arguments)
+    assert not any(rough.empty)
     for which in ('calm', 'in_turn'):
         never, _ = felt(low, stood, **{which: False}, **arguments)
-        assert never.gaps == 0.0
+        assert never.gaps == 0.0 and not any(never.empty)
 
 
 def test_gaps_are_counted_on_for_a_way() -> None:
