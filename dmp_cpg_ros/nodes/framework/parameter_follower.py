@@ -62,6 +62,7 @@ class ParameterFollower:
         self._askers = {owner: node.create_client(GetParameters, f'{owner}/get_parameters')
                         for owner in self._names}
         self._pending: dict[str, Future] = {}
+        self._asked_s: dict[str, float] = {}
         self._claimed: dict[str, dict[str, Any]] = {}
         expected = node.parameters_of(NodeParameters).expected_nodes
         self.unheard = {owner for owner in self._names if owner in expected}
@@ -94,8 +95,11 @@ class ParameterFollower:
             return
         if not self._askers[owner].service_is_ready():
             raise DataError(f'{told} is said to be changed by {owner}, which does not answer')
-        asked = self._pending.get(owner)
+        asked, client = self._pending.get(owner), self._askers[owner]
         self._claimed[owner] = told
+        if asked is not None and time.monotonic() - self._asked_s[owner] > FIRST_ASK_S:
+            client.remove_pending_request(asked)  # of who has died since: nobody will answer
+            asked = None
         if asked is None or asked.done():  # else it asks again when the answer is there
             self._ask_owner(owner)
 
@@ -121,7 +125,7 @@ class ParameterFollower:
         claimed = self._claimed.pop(owner, {})
         future = self._askers[owner].call_async(
             GetParameters.Request(names=self._names[owner]))
-        self._pending[owner] = future
+        self._pending[owner], self._asked_s[owner] = future, time.monotonic()
         future.add_done_callback(self._node.guarded(
             f'{owner}/get_parameters', partial(self._answered, owner, claimed)))
 
