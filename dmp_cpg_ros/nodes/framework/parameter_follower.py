@@ -98,7 +98,7 @@ class ParameterFollower:
         asked, client = self._pending.get(owner), self._askers[owner]
         self._claimed[owner] = told
         if asked is not None and time.monotonic() - self._asked_s[owner] > FIRST_ASK_S:
-            client.remove_pending_request(asked)  # of who has died since: nobody will answer
+            client.remove_pending_request(asked)  # who was asked may have died, and not answer
             asked = None
         if asked is None or asked.done():  # else it asks again when the answer is there
             self._ask_owner(owner)
