@@ -32,8 +32,8 @@ from dmp_cpg_ros.core.contraction.synchronisation import (
 from dmp_cpg_ros.core.gait.network import LONGEST_STEP
 from dmp_cpg_ros.core.inhibition.step_timing import QUICKEST
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.roots import last_that_holds
-from dmp_cpg_ros.core.maths.step_comparison import StepBounds, StepComparison
+from dmp_cpg_ros.core.maths.roots import sign_change
+from dmp_cpg_ros.core.maths.step_comparison import StepBounds, step_comparison
 
 STEP_ERROR = 0.025
 """c: with s = tick · ℓ, a mode that decays by more than c s⁴ per tick decays in the step too."""
@@ -44,6 +44,7 @@ LARGEST_MILD_STEP = 1.4
 _FARTHEST_STAGE = 1.29  # |a|, |b| over r up to which the bounds of Q are what they are taken for
 _CASCADE = 2.0**-64  # weight of a component of a graph, as a share of those before it
 _MOST_TRIALS = 40
+_CYCLE = 1e-13  # precision of its radius
 
 
 def longest_step(rho: float, radius: float, omega: float, rate: float) -> float:
@@ -76,7 +77,7 @@ def cycle_radius_error(rho: float, radius: float, omega: float, tick_s: float) -
 
     A locked network feels no coupling, so that each oscillator is stepped as if it were alone: by
     the method of the suite without a linear part, which is Kutta's third-order one. Its circle is
-    found by bisection.
+    where its radius neither grows nor shrinks.
 
     Parameters
     ----------
@@ -100,9 +101,10 @@ def cycle_radius_error(rho: float, radius: float, omega: float, tick_s: float) -
         return abs(R + tick_s / 6.0 * (first + 4.0 * middle + last)) - R
 
     low, high = 0.5 * radius, 1.5 * radius
-    if not change(low) > 0.0 > change(high):
+    grows, shrinks = change(low), change(high)
+    if not grows > 0.0 > shrinks:
         return math.inf
-    cycle = last_that_holds(lambda R: change(R) > 0.0, low, high, 50)
+    cycle, _ = sign_change(lambda R: -change(R), low, high, _CYCLE, (-grows, -shrinks))
     return abs(cycle / radius - 1.0)
 
 
@@ -170,7 +172,7 @@ def stepped_network(s: Setting, analysis: NetworkAnalysis) -> SteppedNetwork | N
         return None
     r, omega, h = s.network.parameters.radius, s.span.omega[1], step_of(s.tick_s)
     L, alpha = comparison_laplacian(graph), capture.gains
-    held, free = StepComparison(L + np.diag(alpha), h), StepComparison(L, h)
+    held, free = step_comparison(L + np.diag(alpha), h), step_comparison(L, h)
     kappa = 2.0 * rho * r**2
     bounds, quick = held.moduli(kappa, omega), free.moduli(kappa, QUICKEST * omega)
     disc = max(r, *(_disc(bound, gains * r, rho * r**3)
@@ -286,7 +288,7 @@ def _locking(s: Setting, analysis: NetworkAnalysis, L: Array, h: float, farthest
         xi = cascade_weights(s.network.system.graph, _CASCADE)
     V, root = synchronisation_complement(len(L), 1, xi), np.sqrt(xi)
     kappa = p.rho * (1.5 * farthest**2 - p.radius**2)
-    bound = StepComparison(V @ (root[:, None] * L / root) @ V.T, h).norms(
+    bound = step_comparison(V @ (root[:, None] * L / root) @ V.T, h).norms(
         kappa, QUICKEST * s.span.omega[1])
     most = np.full(1, kappa + p.rho * p.radius**2)
     return -math.log(float(bound.difference(most, most, most)[0, 0])) / h

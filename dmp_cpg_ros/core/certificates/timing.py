@@ -40,7 +40,7 @@ DELAY_TICKS = 6
 LONGEST_STOP = 10.0
 """Time within which a stop and a start must be bounded; predictions look as far ahead [s]."""
 
-_STEP, _BLOCK = 0.01, 32  # [s], and steps that are taken at once
+_STEP, _BLOCK, _BLOCKS = 0.01, 32, 4  # [s], steps of a block, and blocks looked at at once
 _HORIZON = 10.0  # [s] beyond it a bound is of no use
 
 
@@ -290,27 +290,32 @@ def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed
         return math.inf
     swings = _filtered(math.exp(-s.parameters.leg.activity_rate * of.cell))
     carried, fed = _in_a_block(of)
-    bounds, activity = of.start, np.ones(N)
-    for begin in range(0, cells, _BLOCK):
+    bounds, activity = of.start, np.ones((1, N))
+    for begin in range(0, cells, _BLOCKS * _BLOCK):
         falling = list[float]()
-        for _ in range(_BLOCK):
+        for _ in range(_BLOCKS * _BLOCK):
             falling.append(speed)
             speed = max(0.0, min(speed * fade, speed - a_b * of.cell))
-        driven = np.stack(drive(speeds := np.array(falling)), axis=1)
-        within = (carried @ bounds + fed @ driven.ravel()).reshape(_BLOCK + 1, -1)
-        v, e = within[:-1, -2 * N:-N], within[:-1, -N:]
+        within, swinging = list[Array](), list[Array]()
+        for driven in np.stack(drive(speeds := np.array(falling)), axis=1).reshape(_BLOCKS, -1):
+            block = (carried @ bounds + fed @ driven).reshape(_BLOCK + 1, -1)
+            within.append(block[:-1, -2 * N:])
+            bounds = block[-1]
+        v, e = np.concatenate(within).reshape(-1, 2, N).swapaxes(0, 1)
         inner = np.maximum(of.inner, rest.radius - e)
         phase_rate = np.divide(v, inner, out=np.full_like(v, np.inf), where=inner > 1e-12)
-        wanted = np.minimum(1.0, phase_rate / span.omega_armed[0])
-        swinging = swings @ np.concatenate([activity[None], wanted])
+        for wanted in np.minimum(1.0, phase_rate / span.omega_armed[0]).reshape(
+                _BLOCKS, _BLOCK, N):
+            block = swings @ np.concatenate([activity, wanted])
+            swinging.append(block[:-1])
+            activity = block[-1:]
         resting = np.flatnonzero(
             (phase_rate.max(axis=1) <= supervisor.REST_PHASE_RATE)
             & (speeds <= REST_SPEED)
-            & (swinging[:-1].max(axis=1) <= supervisor.REST_ACTIVITY))
+            & (np.concatenate(swinging).max(axis=1) <= supervisor.REST_ACTIVITY))
         if len(resting) > 0:
             cell = begin + int(resting[0])
             return cell * of.cell if cell < cells else math.inf
-        bounds, activity = within[-1], swinging[-1]
     return math.inf
 
 

@@ -299,12 +299,12 @@ def arcs_between(places: Array, new_places: Array, duty: float, new_duty: float)
         frequency of the two is that of the gait.
     """
     direct = wrapped(2.0 * np.pi * (new_places - places)) / (2.0 * np.pi)
-    best, least = direct, (float('inf'),)
-    for turns in product((0.0, 1.0, -1.0), repeat=len(direct) - 1):
-        arcs = direct + np.array((0.0, *turns))
-        arcs -= 0.5 * (arcs.max() + arcs.min())
-        cost = (float(np.ptp(arcs)), crowding(places, arcs, duty, new_duty),
-                float(np.abs(arcs).sum()), *(-arcs).tolist())
+    possible = direct + np.array(list(product((0.0,), *[(0.0, 1.0, -1.0)] * (len(direct) - 1))))
+    possible -= 0.5 * (possible.max(axis=1) + possible.min(axis=1))[:, None]
+    spread = np.ptp(possible, axis=1)
+    best, least = direct, (np.inf,)
+    for arcs in possible[spread <= spread.min() + ROUNDING]:  # crowding decides among them alone
+        cost = (crowding(places, arcs, duty, new_duty), np.abs(arcs).sum(), *(-arcs).tolist())
         if _less(cost, least):
             best, least = arcs, cost
     return best

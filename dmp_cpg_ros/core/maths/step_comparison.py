@@ -18,6 +18,7 @@ Lipschitz, for the difference of two states.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import comb
 from typing import NamedTuple
 
@@ -183,3 +184,13 @@ class StepComparison:
         odd = np.maximum(np.linalg.eigvalsh(orders[1::2])[..., -1], 0.0)            # (3, 18)
         squared = even + np.abs(omega) ** np.arange(1, 2 * _POWERS - 1, 2) @ odd
         return StepBounds(*np.sqrt(np.maximum(squared, 0.0))[:, None, None])
+
+
+def step_comparison(M: Array, dt: float) -> StepComparison:
+    """:class:`StepComparison`, or the last that was made of the same."""
+    return _kept(len(M), np.asarray(M, dtype=float).tobytes(), dt)
+
+
+@lru_cache(maxsize=16)
+def _kept(n: int, M: bytes, dt: float) -> StepComparison:
+    return StepComparison(np.frombuffer(M).reshape(n, n), dt)
