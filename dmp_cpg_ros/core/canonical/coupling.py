@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.maths import Array
 Edges = tuple[tuple[int, int], ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CouplingGraph:
     """Directed edges with 2×2 gains and the phases at which the nodes lock.
 

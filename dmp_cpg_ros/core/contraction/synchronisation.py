@@ -12,6 +12,7 @@ weights ξ (ξᵀL = 0), or a hierarchy of components that follow a root (Propos
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -75,27 +76,33 @@ def synchronisation(graph: CouplingGraph, growth: float) -> Synchronisation:
     Synchronisation
         Not synchronising (connectivity 0) when no node reaches all others.
     """
+    return replace(_without_growth(graph), growth=growth)
+
+
+@lru_cache(maxsize=64)
+def _without_growth(graph: CouplingGraph) -> Synchronisation:
+    """What the couplings give, kept: gaits and oscillators change more often than they do."""
     L = graph.block_laplacian()
     scalar = comparison_laplacian(graph)
-    found = _best_bound(graph, L, scalar, growth)
+    found = _best_bound(graph, L, scalar)
     tiny = 1e-9 * (1.0 + float(np.abs(L).max()))
     felt = 0.0 if found.weights is None else float(
         np.abs(np.kron(found.weights, np.eye(2)) @ L).max())
     return replace(found, free_mean=felt <= tiny, overshoot=overshoot(scalar))
 
 
-def _best_bound(graph: CouplingGraph, L: Array, scalar: Array, growth: float) -> Synchronisation:
+def _best_bound(graph: CouplingGraph, L: Array, scalar: Array) -> Synchronisation:
     """Largest connectivity of those that are proved for the graph."""
     even = np.full(graph.size, 1.0 / graph.size)
     symmetric = np.allclose(L, L.T, rtol=0.0, atol=1e-12 * (1.0 + np.abs(L).max()))
-    best = Synchronisation(connectivity(L, graph.size), growth, even,
+    best = Synchronisation(connectivity(L, graph.size), 0.0, even,
                            'symmetric' if symmetric else 'projected')
     if symmetric:
         return _connected(best)
     weights = left_null_weights(scalar)
     weighted = None if weights is None else Synchronisation(
-        connectivity(L, graph.size, weights), growth, weights, 'weighted')
-    for other in (weighted, _hierarchical(graph, L, scalar, growth)):
+        connectivity(L, graph.size, weights), 0.0, weights, 'weighted')
+    for other in (weighted, _hierarchical(graph, L, scalar)):
         if other is not None and other.connectivity > best.connectivity * (1.0 + _TINY):
             best = other  # of equal ones the first, however they are rounded
     return _connected(best)
@@ -105,11 +112,10 @@ def _connected(found: Synchronisation) -> Synchronisation:
     """Report a connectivity of rounding errors as what it is."""
     if found.connectivity > 1e-9:
         return found
-    return Synchronisation(0.0, found.growth, None, 'not connected')
+    return Synchronisation(0.0, 0.0, None, 'not connected')
 
 
-def _hierarchical(graph: CouplingGraph, L: Array, scalar: Array,
-                  growth: float) -> Synchronisation | None:
+def _hierarchical(graph: CouplingGraph, L: Array, scalar: Array) -> Synchronisation | None:
     """Root component first, then each component driven by those before it.
 
     A driven component contracts towards its only solution, which is the root's, at the decay of
@@ -121,7 +127,7 @@ def _hierarchical(graph: CouplingGraph, L: Array, scalar: Array,
         smallest = min(smallest, slowest_rate(scalar[np.ix_(group, group)]))
     if not others or not np.isfinite(smallest) or smallest <= 1e-9:
         return None
-    return Synchronisation(float(smallest), growth, None, 'hierarchical')
+    return Synchronisation(float(smallest), 0.0, None, 'hierarchical')
 
 
 def _of_root(L: Array, scalar: Array, root: list[int]) -> tuple[float, Array]:

@@ -19,7 +19,13 @@ from math import atan2, ceil, cos, pi, sin
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.coupling import TOPOLOGIES, degrees, graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.coupling import (
+    TOPOLOGIES,
+    CouplingGraph,
+    degrees,
+    graph_from_edges,
+    topology,
+)
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf, Oscillators
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, state_at, turned
@@ -90,9 +96,14 @@ def network_system(parameters: CanonicalParameters, phases: Array) -> CanonicalS
 
 @lru_cache(MOST_KEPT)
 def _network_system(p: CanonicalParameters, phases: bytes) -> CanonicalSystem:
-    graph = graph_from_edges(len(LEGS), topology(p.coupling_graph, len(LEGS)), p.coupling_gain,
-                             places := np.frombuffer(phases))
-    return CanonicalSystem(graph, p.oscillators, state_at(places, p.radius))
+    graph = _named_graph(p.coupling_graph, p.coupling_gain, phases)
+    return CanonicalSystem(graph, p.oscillators, state_at(graph.phases, p.radius))
+
+
+@lru_cache(MOST_KEPT)
+def _named_graph(name: str, gain: float, phases: bytes) -> CouplingGraph:
+    """Couplings, which other oscillators share, with all that is known of them."""
+    return graph_from_edges(len(LEGS), topology(name, len(LEGS)), gain, np.frombuffer(phases))
 
 
 class GaitNetwork:

@@ -31,6 +31,9 @@ _POWERS = 4  # 1, q, q², q³
 
 _BERNSTEIN = np.array([
     [comb(k, m) / comb(_POWERS - 1, m) for m in range(_POWERS)] for k in range(_POWERS)])
+_ORDERS = np.array([[[1j**m * (-1j)**k * (m + k == order) for k in range(_POWERS)]
+                     for m in range(_POWERS)] for order in range(2 * _POWERS - 1)])
+"""What dᵀ_m d_k adds to each order of ω in PᴴP, P = Σ_k d_k (−iω)^k."""
 
 
 class StepBounds(NamedTuple):
@@ -173,10 +176,8 @@ class StepComparison:
         coefficients.
         """
         d = self._about(kappa)
-        orders = np.zeros((2 * _POWERS - 1, *d.shape[1:]), dtype=complex)
-        for m in range(_POWERS):
-            for k in range(_POWERS):
-                orders[m + k] += 1j**m * (-1j)**k * np.swapaxes(d[m], -1, -2) @ d[k]
+        products = np.swapaxes(d, -1, -2)[:, None] @ d                            # dᵀ_m d_k
+        orders = np.tensordot(_ORDERS, products, 2)
         orders = 0.5 * (orders + np.swapaxes(orders, -1, -2).conj())
         # a polynomial in ω² lies among Bernstein's coefficients
         turned = _BERNSTEIN * omega ** (2 * np.arange(_POWERS))
