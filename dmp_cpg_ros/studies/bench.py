@@ -50,7 +50,7 @@ from dmp_cpg_ros.studies.draws import both_ways
 from dmp_cpg_ros.studies.loop_recording import LoopRun
 from dmp_cpg_ros.studies.output import parser_of, write_results
 from dmp_cpg_ros.studies.tightness import network
-from dmp_cpg_ros.suite import Suite, load_gaits, load_suite
+from dmp_cpg_ros.suite import Suite, load_suite
 
 TICK, OMEGA, GAIN = 0.004, 9.0, 100.0
 """Tick [s], angular frequency [rad/s] and sum of the gains at each node [1/s] of the networks."""
@@ -220,7 +220,7 @@ def _walking(overrides: Mapping[str, object] | None = None) -> tuple[Suite, Loop
     """The plain loop, 2 s after it was told to walk, and its parameters."""
     suite = load_suite(overrides={'cmd_vel_timeout': 0.0, **(overrides or {})})
     robot = MujocoRobot(suite.robot_file, suite.tick_ns)
-    loop = WalkingLoop(robot.description, suite.gait, suite.parameters, load_gaits())
+    loop = WalkingLoop(robot.description, suite.gait, suite.parameters, suite.gaits.gaits)
     loop.command(0.5)
     run = LoopRun(robot, loop)
     run.tick(500 * run.tick_s)

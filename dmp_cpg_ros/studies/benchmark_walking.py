@@ -249,11 +249,12 @@ def run_robot(file: str, phases: int) -> dict[str, Any]:
         ``pushed``, the sideways speed change survived at every phase of that amble [m/s].
     """
     # a zero command is no request here, but the first command starts the gait
-    suite = suite_of(robot=file)
+    suite = suite_of(robot=file, gait='amble')
     robot = MujocoRobot(suite.robot_file, suite.tick_ns)
     shares = [i / phases for i in range(phases)]
     stops = StopSummary(list(run_trials(
-        robot, [StopCase('amble', 0.5, phase) for phase in shares], suite.parameters)))
+        robot, suite.gait, [StopCase('amble', 0.5, phase) for phase in shares],
+        suite.parameters)))
     return {
         'mass': robot.description.mass, 'amble': trials.steady('amble', (0.5, 0.0, 0.0), file),
         'trot': trials.steady('trot', (1.0, 0.0, 0.0), file), 'top_speed': _top_speed(file),

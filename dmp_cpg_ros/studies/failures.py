@@ -37,7 +37,7 @@ from dmp_cpg_ros.robot.mujoco_robot import LYING_TILT, MujocoRobot
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.workers import Workers
-from dmp_cpg_ros.suite import load_gaits, load_suite
+from dmp_cpg_ros.suite import load_suite
 
 GAITS = ('amble', 'trot')
 """Gaits of the tables."""
@@ -124,7 +124,8 @@ class FailingWalk:
         suite = load_suite(overrides={'gait': gait, 'robot': robot})
         self.robot = MujocoRobot(suite.robot_file, suite.tick_ns, world=suite.world,
                                  sensors=suite.sensors)
-        self.loop = WalkingLoop(self.robot.description, suite.gait, suite.parameters, load_gaits())
+        self.loop = WalkingLoop(
+            self.robot.description, suite.gait, suite.parameters, suite.gaits.gaits)
         self.injector = FaultInjector(0)
         self.watchdog = CommandWatchdog(
             self.robot.description, round(suite.robot.target_timeout * 1e9))

@@ -4,6 +4,7 @@
 gaits that change every 2 to 8 s, stops every 4 to 14 s that are held for 0.2 to 4.5 s. With
 ``--changes`` also one of the parameters that may change while they run every 0.3 to 3 s, anywhere
 in its range or in what certificates can be had for, and lying down or standing up every 5 to 20 s.
+With ``--drawn-gaits`` gaits have any lags, as those of a user's own may have them.
 With ``--auto-gait`` the gait is chosen by speed, among gaits and at speeds that change every 5 to
 20 s; with ``--disturbed`` each walk is disturbed by some of a slippery floor, hills and bumps, a
 payload, and pushes (:mod:`~dmp_cpg_ros.studies.disturbances`).
@@ -30,6 +31,7 @@ import numpy as np
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.coupling import TOPOLOGIES
 from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.mujoco_import import mujoco
@@ -40,7 +42,6 @@ from dmp_cpg_ros.studies.loop_recording import Velocity, suite_of
 from dmp_cpg_ros.studies.push_trials import push
 from dmp_cpg_ros.studies.walking_trials import Walk
 from dmp_cpg_ros.studies.workers import Workers
-from dmp_cpg_ros.suite import load_gaits
 
 JUMPS, CHANGES, STOPS, HOLDS = (0.5, 3.0), (2.0, 8.0), (4.0, 14.0), (0.2, 4.5)
 """Times between jumps of the command, changes of the gait and stops, and of holding one [s]."""
@@ -49,6 +50,9 @@ SETTINGS, MODES, CHOICES = (0.3, 3.0), (5.0, 20.0), (5.0, 20.0)
 """Times between changes of a parameter, between requests to lie down or stand up, and between
 changes of what ``auto_gait`` chooses among [s].
 """
+
+DRAWN = ('first', 'second', 'third')
+"""Names of gaits that are drawn."""
 
 GAITS = ('amble', 'walk', 'trot', 'pace', 'bound', 'pronk')
 
@@ -174,9 +178,25 @@ def choice(rng: np.random.Generator, gaits: Sequence[str]) -> dict[str, Any]:
             'auto_gaits': tuple(map(str, rng.choice(gaits, len(borders) + 1, replace=False)))}
 
 
+def drawn_gaits(seed: int) -> dict[str, Gait]:
+    """Three gaits of which each leg lags by anything or by twelfths of a cycle, at 0.3 to 0.75
+    cycles, dimensionless, and stands for 0.5 to 0.8 of them.
+    """
+    rng, gaits = np.random.default_rng(seed), dict[str, Gait]()
+    for name in DRAWN:
+        lags = rng.random(4) if rng.random() < 0.5 else rng.integers(0, 12, 4) / 12.0
+        cadence, duty = rng.uniform(0.3, 0.5), rng.uniform(0.55, 0.8)
+        gaits[name] = Gait.from_mapping(name, {
+            'lag': dict(zip(LEGS, lags.tolist(), strict=True)), 'speed': [0.0, 0.5],
+            'cadence': [cadence, cadence * rng.uniform(1.0, 1.5)],
+            'duty_factor': [duty, max(0.5, duty - rng.uniform(0.0, 0.15))], 'highest_speed': 0.5})
+    return gaits
+
+
 def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[str] = GAITS,
           changes: bool = False, auto_gait: bool = False, disturbed: bool = False,
-          rate: float = 0.0, size: float = 1.0) -> Outcome:
+          rate: float = 0.0, size: float = 1.0, file: str | None = None,
+          drawn: bool = False) -> Outcome:
     """Walk one course, from a gait that its seed draws.
 
     Parameters
@@ -199,13 +219,20 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
         Of the control [Hz]; that of the package's parameter file with 0.
     size : float
         Of disturbances: lengths, in those of the package's own robot.
+    file : str, optional
+        Parameter file; the package's own without.
+    drawn : bool
+        Whether gaits are drawn instead of named.
     """
+    known = drawn_gaits(seed) if drawn else None
+    gaits = list(known or gaits)
     first = gaits[seed % len(gaits)]
-    p = suite_of(robot=robot).parameters.reference
+    p = suite_of(file, robot=robot).parameters.reference
     limits = (p.max_speed, p.max_lateral_speed, p.max_turn_rate)
     disturbance = Disturbance.drawn(seed, size) if disturbed else UNDISTURBED
     run = Walk(first, robot, disturbance.world, seed + 1,
-               (*disturbance.values, *((('control_rate', rate),) if rate else ())))
+               (*disturbance.values, *((('control_rate', rate),) if rate else ())), file=file,
+               gaits=known)
     outcome = Outcome(seed, disturbed=disturbance.told)
     loop, asked, open_stop = run.loop, (0.0, 0.0, 0.0), None
     events = course(seed, seconds, limits, gaits, changes, auto_gait)
@@ -279,11 +306,13 @@ def touches_itself(model: mujoco.MjModel, data: mujoco.MjData) -> bool:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the walks and print what became of them; returns 1 if one fell or a stop was late."""
     parser = output.parser_of('random_commands', __doc__, 'every outcome')
+    parser.add_argument('file', nargs='?', help="parameter file; the package's own without")
     parser.add_argument('--runs', type=output.at_least_one, default=20, metavar='N')
     parser.add_argument('--seconds', type=float, default=60.0, help='of each walk (default: 60)')
     parser.add_argument('--robot', metavar='FILE', help="robot file (default: the suite's own)")
-    parser.add_argument('--gaits', nargs='+', choices=sorted(load_gaits()), default=GAITS,
-                        metavar='GAIT', help='gaits to change among (default: all six)')
+    parser.add_argument('--gaits', nargs='+', metavar='GAIT', help="gaits to change among, of the "
+                        "parameter file's gaits_file (default: all of them)")
+    parser.add_argument('--drawn-gaits', action='store_true', help='gaits that are drawn instead')
     parser.add_argument('--changes', action='store_true', help='parameters change, and the robot '
                         'lies down and stands up, meanwhile')
     parser.add_argument('--auto-gait', action='store_true', help='the gait is chosen by speed')
@@ -296,9 +325,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _study(options: argparse.Namespace, _: RosArguments) -> int:
-    walk = partial(trial, seconds=options.seconds, robot=options.robot, gaits=options.gaits,
+    known = suite_of(options.file, robot=options.robot).gaits
+    for gait in (gaits := options.gaits or list(known.gaits)):
+        known.named(gait)
+    walk = partial(trial, seconds=options.seconds, robot=options.robot, gaits=gaits,
                    changes=options.changes, auto_gait=options.auto_gait,
-                   disturbed=options.disturbed, rate=options.rate)
+                   disturbed=options.disturbed, rate=options.rate, file=options.file,
+                   drawn=options.drawn_gaits)
     outcomes = []
     with Workers(options.workers, options.cluster, progress=True) as workers:
         for outcome in workers.map(walk, range(options.seed, options.seed + options.runs)):

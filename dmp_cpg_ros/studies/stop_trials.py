@@ -25,6 +25,7 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.world import WORLDS
@@ -36,7 +37,7 @@ from dmp_cpg_ros.studies import loop_recording as runs
 from dmp_cpg_ros.studies.freezing_loop import FreezingLoop
 from dmp_cpg_ros.studies.loop_recording import LoopRun, StopOutcome, suite_of
 from dmp_cpg_ros.studies.workers import Workers
-from dmp_cpg_ros.suite import Suite, load_gait
+from dmp_cpg_ros.suite import Suite
 
 METHODS = ('inhibition', 'freeze', 'finish_swing')
 """Ways to stop: sparse inhibition, and the two simple ones."""
@@ -183,22 +184,25 @@ def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
     """Run the cases of one walk with the robot and the parameters of a parameter file, and the
     certified time to rest, which holds for every phase and is infinite without a certificate.
     """
-    suite = suite_of(file, inhibited_legs=(cases[0].leg,), braking=cases[0].braking)
-    gait = load_gait(cases[0].gait).scaled(cases[0].cadence)
+    suite = suite_of(file, gait=cases[0].gait, inhibited_legs=(cases[0].leg,),
+                     braking=cases[0].braking)
+    gait = suite.gait.scaled(cases[0].cadence)
     robot, p = cases[0].robot(suite), suite.parameters
     certificate = certify(Setting.of(
         GaitNetwork(p.canonical, gait, body_scale(robot.description)), p, suite.tick_ns * 1e-9))
-    return list(run_trials(robot, cases, p, certificate.time_to_rest))
+    return list(run_trials(robot, gait, cases, p, certificate.time_to_rest))
 
 
-def run_trials(robot: MujocoRobot, cases: Sequence[StopCase], parameters: SuiteParameters,
-               bound_s: float = np.nan) -> Iterator[StopOutcome]:
+def run_trials(robot: MujocoRobot, gait: Gait, cases: Sequence[StopCase],
+               parameters: SuiteParameters, bound_s: float = np.nan) -> Iterator[StopOutcome]:
     """Walk once; at the phase of each case stop and hold, and after an inhibition walk on.
 
     Parameters
     ----------
     robot : MujocoRobot
         Is reset; equal calls give equal outcomes.
+    gait : Gait
+        At the cadence of the cases.
     cases : sequence of StopCase
         Of one gait, speed and cadence, with ascending phases. The leg is in the parameters.
     parameters : SuiteParameters
@@ -211,7 +215,6 @@ def run_trials(robot: MujocoRobot, cases: Sequence[StopCase], parameters: SuiteP
     StopOutcome
         One per case, in order.
     """
-    gait = load_gait(cases[0].gait).scaled(cases[0].cadence)
     run = LoopRun(robot, FreezingLoop(robot.description, gait, parameters))
     for case in cases:
         run.loop.command(case.speed)

@@ -36,7 +36,6 @@ from dmp_cpg_ros.studies.output import (
 from dmp_cpg_ros.studies.random_stops import random_cases, scenario_bound, summary
 from dmp_cpg_ros.studies.stop_trials import METHODS, Results, StopCase, run_cases
 from dmp_cpg_ros.studies.workers import Workers
-from dmp_cpg_ros.suite import load_gait
 
 SPREADS = {
     'prediction error %': ('prediction_error', 100.0, 1), 'bound s': ('bound_s', 1.0, 2),
@@ -69,7 +68,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--speeds', type=float, nargs='+', default=[0.2, 0.5, 0.8], metavar='V',
                         help='commanded speeds [m/s] (default: 0.2 0.5 0.8)')
     parser.add_argument('--gaits', nargs='+', default=['amble', 'walk', 'trot'], metavar='GAIT',
-                        help='gaits by name (default: amble walk trot)')
+                        help="gaits by name, of the parameter file's gaits_file "
+                        '(default: amble walk trot)')
     parser.add_argument('--legs', nargs='+', default=[LEGS[0]], choices=(*LEGS, AUTO),
                         help='legs whose oscillator is inhibited, one at a time; auto: whichever '
                         'comes first (default: fl)')
@@ -98,7 +98,7 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
     cases = random_cases(options) if options.random else cases_of(options)
     suite = suite_of(options.file, inhibited_legs=(cases[0].leg,), braking=cases[0].braking)
     for gait in options.gaits:
-        load_gait(gait)
+        suite.gaits.named(gait)
     results = run_cases(cases, options.file, Workers(
         options.workers, options.cluster, not options.quiet), options.record)
     print(f'{suite.file}: {len(cases)} stops; columns with two numbers are median / worst\n')

@@ -20,13 +20,13 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.metrics.robot import cost_of_transport, cost_without_losses
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
 from dmp_cpg_ros.core.errors import MissingFileError
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.loop import Array, WalkingLoop
 from dmp_cpg_ros.core.robot_model.grounds import Steps, World
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world import WORLDS
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies.loop_recording import LoopRun, Velocity, recording_of, suite_of
-from dmp_cpg_ros.suite import load_gaits
 
 Values = tuple[tuple[str, Any], ...]
 
@@ -65,16 +65,23 @@ class Walk(LoopRun[WalkingLoop]):
         Parameters that differ from the package's own.
     start : bool
         Whether the gait is released; without it rests.
+    file : str, optional
+        Parameter file; the package's own without.
+    gaits : mapping of str to Gait, optional
+        Gaits by name; those of the parameter file without.
     """
 
     def __init__(self, gait: str, robot: str | None = None, world: World | None = None,
-                 seed: int = 0, values: Values = (), start: bool = True) -> None:
-        suite = suite_of(robot=robot, gait=gait, **{'auto_inhibit': False, **dict(values)})
+                 seed: int = 0, values: Values = (), start: bool = True,
+                 file: str | None = None, gaits: Mapping[str, Gait] | None = None) -> None:
+        suite = suite_of(file, robot=robot, gait=None if gaits else gait,
+                         **{'auto_inhibit': False, **dict(values)})
+        known = gaits or suite.gaits.gaits
         body = MujocoRobot(suite.robot_file, suite.tick_ns, seed, 0.03 if seed else 0.0,
                            world=world or suite.world, sensors=suite.sensors,
                            mismatch=suite.mismatch)
         super().__init__(body, WalkingLoop(
-            body.description, suite.gait, suite.parameters, load_gaits()))
+            body.description, known[gait], suite.parameters, known))
         self.walk(STANDING)
         if start:
             self.loop.request(False)

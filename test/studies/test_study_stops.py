@@ -43,6 +43,23 @@ def hold(speed: np.ndarray, force: float = 20.0) -> Recording:
         feet=FootForceSeries(time, np.full((n, 4), force)))
 
 
+def test_gaits_are_those_of_the_parameter_file(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from dmp_cpg_ros.studies.study_stops import main
+
+    (tmp_path / 'gaits.yaml').write_text(
+        'gaits: {canter: {lag: {fl: 0, fr: 0.7, rl: 0.7, rr: 0.4}, speed: [0, 0.6], '
+        'cadence: [0.4, 0.55], duty_factor: [0.65, 0.55]}}\n')
+    file = tmp_path / 'suite.yaml'
+    file.write_text(f"/**: {{ros__parameters: {{gait: canter, gaits_file: "
+                    f"'{tmp_path / 'gaits.yaml'}'}}}}\n")
+    assert main([str(file), '--gaits', 'canter', '--speeds', '0.3', '--phases', '1', '--no-resume',
+                 '--quiet', '--jobs', '1']) == 0
+    assert '| canter | 0.3 |' in capsys.readouterr().out
+    assert main([str(file), '--gaits', 'amble', '--phases', '1']) == 2
+    assert "there is no gait 'amble'; valid are canter" in capsys.readouterr().err
+
+
 def test_the_body_is_at_rest_when_it_stays_slower_than_a_centimetre_per_second() -> None:
     speed = np.repeat([0.2, 0.005, 0.02, 0.0], [100, 50, 50, 300])
     outcome = body_at_rest(hold(speed), ROBOT, 2.0)

@@ -9,8 +9,6 @@ discovery takes on one machine.
 
 from __future__ import annotations
 
-import parsed_once  # noqa: F401
-
 from dmp_cpg_ros.commands import (  # noqa: F401
     analyze,
     fork_server,
@@ -29,6 +27,8 @@ class TestServer(fork_server.ForkServer):
 
 
 if __name__ == '__main__':
+    import parsed_once  # noqa: F401  # not of processes that a command starts
+
     suite_domain.LOOK_S = LOOK_S
     load_suite()
     fork_server.end(fork_server.main())

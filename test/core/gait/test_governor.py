@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.reference.governor import LEAST, Governor
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.studies.disturbances import Disturbance, pushes
-from dmp_cpg_ros.studies.random_commands import GAITS, course, touches_itself, trial
+from dmp_cpg_ros.studies.random_commands import GAITS, course, drawn_gaits, touches_itself, trial
 from dmp_cpg_ros.studies.walking_trials import Walk, attitude, is_there, steady
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
@@ -165,6 +165,14 @@ def test_a_robot_stays_up_that_may_catch_its_legs_at_any_speed_and_does_not_step
 def test_a_robot_that_lies_down_and_gets_other_parameters_meanwhile_has_not_fallen() -> None:
     outcome = trial(71004, 14.0, changes=True)
     assert outcome.fell == '' and outcome.changed > 3 and not outcome.late
+
+
+def test_a_robot_stays_up_in_gaits_with_any_lags() -> None:
+    lags, again, others = ([gait.lag.tolist() for gait in drawn_gaits(seed).values()]
+                           for seed in (41002, 41002, 41003))
+    assert lags == again != others and len({*map(tuple, lags)}) == len(lags)
+    outcome = trial(41002, 9.0, drawn=True)
+    assert outcome.fell == '' and not outcome.late
 
 
 def test_gaits_may_be_asked_for_while_they_are_chosen_by_speed() -> None:
