@@ -217,6 +217,14 @@ class Outcome:
                        for gait, predicted, bound, took in self.course.late]
 
 
+def robot_file(seed: int, folder: Path) -> Path:
+    """Write the file of a robot that is drawn, and its model, into a folder."""
+    model, robot = folder / 'drawn.xml', folder / 'drawn.yaml'
+    model.write_text(Shape.drawn(seed).mjcf(seed), encoding='utf-8')
+    robot.write_text(robot_yaml(inspect_model(model), folder), encoding='utf-8')
+    return robot
+
+
 def trial(seed: int, seconds: float, only: str = '') -> Outcome:
     """Draw a robot, let it walk steadily and stop, and walk a course of random commands [s]; or
     walk such a course only, in which also one of ``ALSO`` happens, disturbances of its size.
@@ -224,10 +232,7 @@ def trial(seed: int, seconds: float, only: str = '') -> Outcome:
     shape = Shape.drawn(seed)
     outcome = Outcome(seed, shape._asdict())
     with TemporaryDirectory() as name:
-        folder = Path(name)
-        model, robot = folder / 'drawn.xml', folder / 'drawn.yaml'
-        model.write_text(shape.mjcf(seed), encoding='utf-8')
-        robot.write_text(robot_yaml(inspect_model(model), folder), encoding='utf-8')
+        robot = robot_file(seed, Path(name))
         for gait in () if only else GAITS:
             run = Walk(gait, str(robot))
             leg = run.loop.canonical.scale.leg_length

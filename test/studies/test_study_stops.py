@@ -21,6 +21,7 @@ from dmp_cpg_ros.core.errors import DataError
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.core.robot_model.grounds import Blocks, Slope
 from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary, body_at_rest, suite_of
+from dmp_cpg_ros.studies.random_robots import robot_file
 from dmp_cpg_ros.studies.random_stops import ROUGHNESS, random_cases, scenario_bound, summary
 from dmp_cpg_ros.studies.stop_trials import StopCase, run_cases, run_walk
 from dmp_cpg_ros.studies.workers import Workers
@@ -155,6 +156,17 @@ def test_a_body_stands_when_it_was_told_to(gait: str, speed: float) -> None:
     """Some swing back over their feet and take longer: ambles by themselves, all when fast."""
     cases = [StopCase(gait, speed, phase, resumes=False) for phase in (0.1, 0.6)]
     for of in run_walk(cases, None):
+        assert of.standing and of.stands_s == pytest.approx(of.still_s, rel=0.1)
+
+
+@pytest.mark.parametrize(('seed', 'speed'), [(102, 0.24), (104, 0.43)])
+def test_the_body_of_a_robot_of_any_size_stands_when_it_was_told_to(
+        seed: int, speed: float, tmp_path: Path) -> None:
+    """Legs of 0.18 and 0.57 m: what holds for one of 0.34 m is a third too long or too short."""
+    file = tmp_path / 'suite.yaml'
+    file.write_text(f"/**: {{ros__parameters: {{robot: '{robot_file(seed, tmp_path)}'}}}}\n")
+    cases = [StopCase('amble', speed, phase, resumes=False) for phase in (0.0, 0.5)]
+    for of in run_walk(cases, str(file)):
         assert of.standing and of.stands_s == pytest.approx(of.still_s, rel=0.1)
 
 

@@ -34,6 +34,11 @@ CALMING, AT_ONCE, LANDED, LONGEST_CALMING = 0.31, 0.12, 0.44, 0.8
 its feet, where it does not, where all feet come down at once, and what no trial exceeded.
 """
 
+TRIED = 0.28
+"""Standing height of the robot of those trials [m]. Times grow with it: equal gaits have speeds in
+√(g l), so that a body swings more often before it is slow enough, and each time for √(l/g).
+"""
+
 STOPPED = 1e-3
 """Speed below which a reference that brakes has stopped [m/s]."""
 
@@ -73,6 +78,8 @@ class Outlook(NamedTuple):
         |v| of the reference now [m/s].
     calming_s : float
         From the last foot's coming down until the body stands, in the middle of trials [s].
+    size : float
+        Standing height over ``TRIED``.
     """
 
     time_s: float
@@ -80,6 +87,7 @@ class Outlook(NamedTuple):
     way_m: float
     speed: float
     calming_s: float = CALMING
+    size: float = 1.0
 
     @property
     def stands_s(self) -> float:
@@ -89,13 +97,13 @@ class Outlook(NamedTuple):
     @property
     def stands_within_s(self) -> float:
         """Time within which it stood in all trials [s]."""
-        return self.down_s + LONGEST_CALMING
+        return self.down_s + LONGEST_CALMING * max(self.size, 1.0)
 
     @property
     def stands_within_m(self) -> float:
         """Way of the body within which it stood in all trials [m]."""
         fixed, share = FARTHER
-        return self.way_m + fixed + share * self.speed
+        return self.way_m + (fixed + share * self.speed) * max(self.size, 1.0)
 
 
 def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
@@ -129,7 +137,8 @@ def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canoni
         At the end.
     """
     way_m, speed, stop = 0.0, hypot(r[0], r[1]), state.requested
-    body = _Body(r, reference.parameters.braking > 0.0, dt)
+    size = canonical.scale.leg_length / TRIED
+    body = _Body(r, reference.parameters.braking > 0.0, dt, size)
     ticks = ticks_ahead(supervisor, reference, canonical, state, published, canon, r, command, dt,
                         body_mode)
     for k, (state, _, canon, r) in zip(range(1, ceil(horizon / dt) + 1), ticks, strict=False):
@@ -141,7 +150,8 @@ def looking_ahead(supervisor: GaitSupervisor, reference: ReferenceSystem, canoni
             body.follow(k * dt, r, canon.gait,
                         _up(canon, state, canon.gait.pace(r, canonical.scale)[3]))
         if state.state in ('at_rest', 'walking', 'free', 'stepping'):
-            return Outlook(k * dt, body.down_s if stop else nan, way_m, speed, body.calming_s)
+            return Outlook(
+                k * dt, body.down_s if stop else nan, way_m, speed, body.calming_s, size)
     return Outlook(inf, nan, nan, speed)
 
 
@@ -161,11 +171,14 @@ class _Body:
         Whether the reference brakes.
     dt : float
         Tick [s].
+    size : float
+        Standing height over ``TRIED``.
     """
 
-    def __init__(self, r: Array, brakes: bool, dt: float) -> None:
+    def __init__(self, r: Array, brakes: bool, dt: float, size: float) -> None:
+        self._size = size
         self._speed, self._brakes, self._share = hypot(r[0], r[1]), brakes, 1.0 - exp(
-            -dt / FOLLOWING)
+            -dt / (FOLLOWING * size))
         self._passed = HIND_ALONE if r[0] >= 0.0 else ()
         self._stopped_s = self._held_s = self.down_s = 0.0
         self._calming_s = CALMING
@@ -186,8 +199,9 @@ class _Body:
         [s].
         """
         if not self._brakes or self._calming_s == LANDED:
-            return self._calming_s
-        return max(AT_ONCE, max(self._stopped_s, self._held_s) + CALMING - self.down_s)
+            return self._size * self._calming_s
+        return max(self._size * AT_ONCE, max(
+            self._stopped_s, self._held_s) + self._size * CALMING - self.down_s)
 
     def _calming(self, gait: GaitInForce) -> float:
         """The same where nothing but the last foot, which is down in this tick, tells it [s]."""
@@ -195,7 +209,7 @@ class _Body:
             return LANDED
         sways = not (gait.firm >= 1.0 and gait.two_sided >= BALANCED
                      and gait.cadence_scale >= OWN_CADENCE)
-        return CALMING if sways or self._speed > SLOW else AT_ONCE
+        return CALMING if sways or self._speed > SLOW / self._size else AT_ONCE
 
 
 def look_ahead(*arguments: Any, **options: Any) -> Outlook:
