@@ -14,6 +14,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
 from dmp_cpg_ros.core.robot_model.grounds import Surface, World
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.files import readable
 from dmp_cpg_ros.robot.model_text import check_text
 from dmp_cpg_ros.robot.mujoco_import import mujoco
@@ -38,6 +39,12 @@ _LOW, _HIGH = np.array((0.52, 0.56, 0.52, 1.0)), np.array((0.80, 0.76, 0.66, 1.0
 _EVERY = 0x7FFFFFFF
 _CONTACT = ('friction', 'solref', 'solimp', 'condim', 'contype', 'conaffinity', 'priority',
             'solmix', 'margin', 'gap')
+
+TERRAIN = 'terrain'
+"""Height field of a world with a surface."""
+
+FOOTINGS = tuple(f'{TERRAIN}_below_{leg}' for leg in LEGS)
+"""Bodies with planes that are not seen and touch nothing until feet are put on them."""
 
 
 def load_model(path: Path, base: str, world: World | None = None) -> mujoco.MjModel:
@@ -135,11 +142,18 @@ def _add_surface(spec: mujoco.MjSpec, surface: Surface, floor: mujoco.MjsGeom | 
     (x_0, x_1), (y_0, y_1), height = surface
     low, high = float(height.min()), float(height.max())
     # MuJoCo scales what is given to [0, 1]
-    spec.add_hfield(name='terrain', nrow=height.shape[0], ncol=height.shape[1],
+    spec.add_hfield(name=TERRAIN, nrow=height.shape[0], ncol=height.shape[1],
                     size=[0.5 * (x_1 - x_0), 0.5 * (y_1 - y_0), high - low, 0.1],
                     userdata=((height - low) / (high - low)).ravel().tolist())
-    geom = spec.worldbody.add_geom(
-        name='terrain', type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname='terrain', rgba=_LOW,
-        pos=[0.5 * (x_0 + x_1), 0.5 * (y_0 + y_1), low])
-    for part in _CONTACT if floor is not None else ():
-        setattr(geom, part, getattr(floor, part))
+    added = [spec.worldbody.add_geom(
+        name=TERRAIN, type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname=TERRAIN, rgba=_LOW,
+        pos=[0.5 * (x_0 + x_1), 0.5 * (y_0 + y_1), low])]
+    for name in FOOTINGS:
+        body = spec.worldbody.add_body(name=name, mocap=True, pos=[0.0, 0.0, low])
+        added.append(body.add_geom(name=name, type=_PLANE, size=[0.0, 0.0, 0.25],
+                                   rgba=[0.0, 0.0, 0.0, 0.0]))
+    for geom in added:
+        for part in _CONTACT if floor is not None else ():
+            setattr(geom, part, getattr(floor, part))
+    for geom in added[1:]:
+        geom.contype = geom.conaffinity = 0

@@ -22,6 +22,7 @@ from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.robot_model.world import height_over_ground
 from dmp_cpg_ros.core.scenario.push import HOLD_NS, PushForce, PushQueue
 from dmp_cpg_ros.robot import model_parts
+from dmp_cpg_ros.robot.footing import Footing
 from dmp_cpg_ros.robot.joint_drive import JointDrive
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_reader import read_description
@@ -156,6 +157,8 @@ class MujocoRobot:
         if mismatch != MismatchParameters():
             model_parts.differ(model, ids, self._dof, mismatch, self.description.mass)
         self._contacts = model_parts.ContactReader(model, ids)
+        surface = world.surface()
+        self._footing = None if surface is None else Footing(model, ids, surface)
         self._hips_in_base = np.array([leg.hip_in_base for leg in self.description.legs])
         if not (np.isfinite(initial_spread) and initial_spread >= 0.0):
             raise ParameterError(f'initial_spread = {initial_spread!r} must be at least 0 rad')
@@ -198,6 +201,8 @@ class MujocoRobot:
         held = start.joint_position
         model_parts.place_robot(
             model, data, self._ids, start.base_position, start.base_quaternion, held)
+        if self._footing is not None:
+            self._footing.follow(data)
         mujoco.mj_forward(model, data)
         if start.settling_s:
             for _ in range(round(start.settling_s * 1e9 / self.tick_ns)):
@@ -229,6 +234,8 @@ class MujocoRobot:
         """
         self._drive.accept(targets)
         self._begin_push()
+        if self._footing is not None:
+            self._footing.follow(self.data)
         model, data, torque, strength = self.model, self.data, self._drive.torque, self._strength
         if self.without_power:
             strength = strength * [leg not in self.without_power for leg in np.repeat(LEGS, 3)]
