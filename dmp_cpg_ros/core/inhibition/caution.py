@@ -21,6 +21,7 @@ the body.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import hypot
 
 from dmp_cpg_ros.core.gait.choice import Changing
 from dmp_cpg_ros.core.gait.network import GaitNetwork
@@ -42,7 +43,16 @@ them, the margins are small by that, and a body that does not go on falls back f
 
 STRIDING = 1.0
 """Least share where gaps are counted on: a body that brakes falls over the leg that hangs in one,
-and slow feet step into every gap.
+and slow feet step into every gap. One whose capture point has left the support ahead or aside
+falls there, as from the crest of a hill, whose curvature feels like a gap: it is cautious.
+"""
+
+OUTWARD = ((1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (0.0, 1.0))
+"""Directions out of the support over its edges: front, right, rear, left."""
+
+TRAILING = 0.5
+"""Cosine between an edge's direction and the way's opposite from which the edge lies behind: to
+slow down does not help who falls back.
 """
 
 NARROW = 0.5
@@ -68,6 +78,28 @@ def room(margins: Sequence[float] | None, leg_length: float, wide: float) -> flo
         return None
     q = NARROW + (1.0 - NARROW) * wide
     return min(margins) / (q * leg_length)
+
+
+def least_share(rough: float, gaps: float, margins: Sequence[float] | None,
+                r: Sequence[float]) -> float:
+    """Least share of the command that is followed on the ground that is felt.
+
+    Parameters
+    ----------
+    rough, gaps : float
+        Height of what feet are to be lifted over, and way on which gaps are counted on [m].
+    margins : sequence of four floats, or None
+        To the edges of the support polygon, where they are known [m].
+    r : sequence of 3 float
+        Reference v_x, v_y [m/s], γ [rad/s].
+    """
+    if rough or not gaps:
+        return CLIMBING if rough else LEAST
+    trailing = -TRAILING * hypot(r[0], r[1])
+    falls = margins is not None and any(
+        margin < 0.0 and x * r[0] + y * r[1] >= trailing
+        for margin, (x, y) in zip(margins, OUTWARD, strict=True))
+    return LEAST if falls else STRIDING
 
 
 def followed_share(share: float, left: float | None, dt: float, most: float = 1.0,

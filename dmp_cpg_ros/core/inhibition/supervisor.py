@@ -35,11 +35,9 @@ from dmp_cpg_ros.core.gait.choice import Changing
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.blocked import NO_BLOCK, Progress, block_step
 from dmp_cpg_ros.core.inhibition.caution import (
-    CLIMBING,
-    LEAST,
-    STRIDING,
     changing_share,
     followed_share,
+    least_share,
     room,
 )
 from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg, way_in
@@ -199,9 +197,10 @@ class GaitSupervisor:
                    network: GaitNetwork, progress: Progress, r: Array, most: float, dt: float
                    ) -> SupervisorState:
         """Follow less of the command, and step faster, while the body is disturbed; less while the
-        gait changes. Feet need time on rough ground, but after a push; over gaps none slows down.
+        gait changes. Feet need time on rough ground, but after a push; over gaps, who does not
+        fall does not slow down.
         """
-        least = CLIMBING if progress.rough else STRIDING if progress.gaps else LEAST
+        least = least_share(progress.rough, progress.gaps, margins, r.tolist())
         p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.wide)
         predicted = state.requested or state.state == 'releasing'
         share, most = 1.0, min(most, state.block.most)

@@ -12,11 +12,14 @@ from test_push_recovery import told
 from dmp_cpg_ros.core.balance.capture_point import WIDE
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.inhibition.caution import (
+    CLIMBING,
     DISTURBED,
     EASY,
     LEAST,
     REGAIN,
+    STRIDING,
     followed_share,
+    least_share,
     room,
 )
 
@@ -36,6 +39,21 @@ def test_the_share_falls_with_the_least_margin_and_comes_back_at_its_rate() -> N
     assert followed_share(1.0, room((0.5 * DISTURBED,) * 4, 0.5, 1.0), TICK) == LEAST
     assert followed_share(LEAST, room(None, 0.5, 1.0), TICK) == LEAST + REGAIN * TICK
     assert followed_share(LEAST, room(WIDE, 0.5, 1.0), 10.0) == 1.0
+
+
+@pytest.mark.parametrize('way', [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.3), (0.0, -0.3), (0.4, 0.4)])
+def test_over_gaps_only_who_falls_ahead_or_aside_slows_down(way: tuple[float, float]) -> None:
+    r = (*way, 0.0)
+    assert least_share(0.0, 1.0, None, r) == least_share(0.0, 1.0, WIDE, r) == STRIDING
+    assert least_share(0.0, 1.0, (0.0,) * 4, r) == STRIDING
+    beyond = ((1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (0.0, 1.0))  # front, right, rear, left
+    for i, edge in enumerate(beyond):
+        margins = [0.1] * 4
+        margins[i] = -0.01
+        back = np.dot(edge, way) < -0.6 * np.hypot(*way)
+        assert least_share(0.0, 1.0, margins, r) == (STRIDING if back else LEAST)
+        assert least_share(0.0, 0.0, margins, r) == LEAST
+        assert least_share(0.05, 1.0, margins, r) == CLIMBING
 
 
 @pytest.mark.parametrize('share', [0.0, 0.4, 1.0])
