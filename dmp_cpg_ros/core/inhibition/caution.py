@@ -43,16 +43,19 @@ them, the margins are small by that, and a body that does not go on falls back f
 
 STRIDING = 1.0
 """Least share where gaps are counted on: a body that brakes falls over the leg that hangs in one,
-and slow feet step into every gap. One whose capture point has left the support ahead or aside
-falls there, as from the crest of a hill, whose curvature feels like a gap: it is cautious.
+and slow feet step into every gap.
 """
+
+FALLING = 0.1
+"""How far it is out, in lengths of the leg; over a gap the leg that hangs takes it to the edge."""
 
 OUTWARD = ((1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (0.0, 1.0))
 """Directions out of the support over its edges: front, right, rear, left."""
 
 TRAILING = 0.5
 """Cosine between an edge's direction and the way's opposite from which the edge lies behind: to
-slow down does not help who falls back.
+slow down does not help who falls back. Over the other edges bodies fall from hills, which feel
+like gaps where they are round and like steps where they are hollow.
 """
 
 NARROW = 0.5
@@ -80,26 +83,33 @@ def room(margins: Sequence[float] | None, leg_length: float, wide: float) -> flo
     return min(margins) / (q * leg_length)
 
 
-def least_share(rough: float, gaps: float, margins: Sequence[float] | None,
-                r: Sequence[float]) -> float:
-    """Least share of the command that is followed on the ground that is felt.
+def falls(margins: Sequence[float] | None, r: Sequence[float], leg_length: float) -> bool:
+    """Whether the capture point has left the support by ``FALLING`` l, over an edge that the way
+    does not leave behind; a body that goes on helps itself there no more.
 
     Parameters
     ----------
-    rough, gaps : float
-        Height of what feet are to be lifted over, and way on which gaps are counted on [m].
     margins : sequence of four floats, or None
         To the edges of the support polygon, where they are known [m].
     r : sequence of 3 float
         Reference v_x, v_y [m/s], γ [rad/s].
+    leg_length : float
+        l [m].
     """
-    if rough or not gaps:
-        return CLIMBING if rough else LEAST
     trailing = -TRAILING * hypot(r[0], r[1])
-    falls = margins is not None and any(
-        margin < 0.0 and x * r[0] + y * r[1] >= trailing
+    return margins is not None and any(
+        margin < -FALLING * leg_length and x * r[0] + y * r[1] >= trailing
         for margin, (x, y) in zip(margins, OUTWARD, strict=True))
-    return LEAST if falls else STRIDING
+
+
+def least_share(rough: float, gaps: float, falling: bool) -> float:
+    """Least share of the command that is followed on the ground that is felt, whose feet are to be
+    lifted over ``rough`` and that counts on gaps for a way ``gaps`` [m], by a body that
+    :func:`falls` or does not.
+    """
+    if falling:
+        return LEAST
+    return CLIMBING if rough else STRIDING if gaps else LEAST
 
 
 def followed_share(share: float, left: float | None, dt: float, most: float = 1.0,

@@ -36,6 +36,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.blocked import NO_BLOCK, Progress, block_step
 from dmp_cpg_ros.core.inhibition.caution import (
     changing_share,
+    falls,
     followed_share,
     least_share,
     room,
@@ -196,18 +197,18 @@ class GaitSupervisor:
     def _balancing(self, state: SupervisorState, margins: Sequence[float] | None,
                    network: GaitNetwork, progress: Progress, r: Array, most: float, dt: float
                    ) -> SupervisorState:
-        """Follow less of the command, and step faster, while the body is disturbed; less while the
-        gait changes. Feet need time on rough ground, but after a push; over gaps, who does not
-        fall does not slow down.
+        """Follow less and step faster while the body is disturbed; less while the gait changes.
+        Feet need time on rough ground, but after a push or when the body falls.
         """
-        least = least_share(progress.rough, progress.gaps, margins, r.tolist())
-        p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.wide)
+        p, leg = self.parameters, network.scale.leg_length
+        left, falling = room(margins, leg, network.gait.wide), falls(margins, r.tolist(), leg)
         predicted = state.requested or state.state == 'releasing'
         share, most = 1.0, min(most, state.block.most)
         if not (predicted or state.push.acts):
-            share = followed_share(state.share, left if p.caution else None, dt, most, least)
-        free = p.step_timing and (state.push.acts or not (predicted or progress.rough))
-        fastest = fastest_lately(state.fastest, r, dt)
+            share = followed_share(state.share, left if p.caution else None, dt, most,
+                                   least_share(progress.rough, progress.gaps, falling))
+        waits = not state.push.acts and (predicted or (progress.rough and not falling))
+        fastest, free = fastest_lately(state.fastest, r, dt), p.step_timing and not waits
         quickness = quickened(state.quickness, left if free else None, dt, quickest(
             network, state.quickness, r, progress.velocity, fastest))
         return replace_unchecked(state, share=share, quickness=quickness, fastest=fastest)

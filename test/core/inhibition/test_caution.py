@@ -11,15 +11,17 @@ from test_push_recovery import told
 
 from dmp_cpg_ros.core.balance.capture_point import WIDE
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.inhibition.blocked import Progress
 from dmp_cpg_ros.core.inhibition.caution import (
     CLIMBING,
     DISTURBED,
     EASY,
+    FALLING,
     LEAST,
     REGAIN,
     STRIDING,
+    falls,
     followed_share,
-    least_share,
     room,
 )
 
@@ -42,18 +44,28 @@ def test_the_share_falls_with_the_least_margin_and_comes_back_at_its_rate() -> N
 
 
 @pytest.mark.parametrize('way', [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.3), (0.0, -0.3), (0.4, 0.4)])
-def test_over_gaps_only_who_falls_ahead_or_aside_slows_down(way: tuple[float, float]) -> None:
-    r = (*way, 0.0)
-    assert least_share(0.0, 1.0, None, r) == least_share(0.0, 1.0, WIDE, r) == STRIDING
-    assert least_share(0.0, 1.0, (0.0,) * 4, r) == STRIDING
+def test_a_body_falls_over_edges_that_its_way_does_not_leave_behind(way: tuple[float, float]
+                                                                    ) -> None:
+    r, out = (*way, 0.0), -FALLING * 0.3
+    assert not (falls(None, r, 0.3) or falls(WIDE, r, 0.3) or falls((0.9 * out,) * 4, r, 0.3))
     beyond = ((1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (0.0, 1.0))  # front, right, rear, left
     for i, edge in enumerate(beyond):
         margins = [0.1] * 4
-        margins[i] = -0.01
-        back = np.dot(edge, way) < -0.6 * np.hypot(*way)
-        assert least_share(0.0, 1.0, margins, r) == (STRIDING if back else LEAST)
-        assert least_share(0.0, 0.0, margins, r) == LEAST
-        assert least_share(0.05, 1.0, margins, r) == CLIMBING
+        margins[i] = 1.1 * out
+        assert falls(margins, r, 0.3) == (np.dot(edge, way) > -0.6 * np.hypot(*way))
+
+
+@pytest.mark.parametrize(('felt', 'share'), [
+    ({'rough': 0.05}, CLIMBING), ({'gaps': 1.0}, STRIDING), ({}, LEAST)])
+def test_on_rough_ground_and_over_gaps_only_who_falls_is_cautious(felt: dict[str, float],
+                                                                  share: float) -> None:
+    for margin, least in ((0.01, share), (-0.05, LEAST)):
+        run = walking(speed=SPEED)
+        body = told(run)
+        body.margins, body.progress = (1.0, margin, 1.0, 1.0), Progress((SPEED, 0.0), **felt)
+        run.go(1.0)
+        assert run.loop.stop.share == least
+        assert (run.loop.stop.quickness > 1.0) == (not felt.get('rough') or margin < 0.0)
 
 
 @pytest.mark.parametrize('share', [0.0, 0.4, 1.0])

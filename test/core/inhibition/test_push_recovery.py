@@ -25,6 +25,7 @@ from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.inhibition import push_recovery
 from dmp_cpg_ros.core.inhibition.announced import Announced
+from dmp_cpg_ros.core.inhibition.blocked import Progress
 from dmp_cpg_ros.core.inhibition.prediction import look_ahead
 from dmp_cpg_ros.core.inhibition.push_recovery import MOST_RELEASES
 from dmp_cpg_ros.core.loop import WalkingLoop
@@ -33,12 +34,13 @@ TO_THE_RIGHT, TO_THE_LEFT = (0.1, 0.0, 0.1, 0.2), (0.1, 0.2, 0.1, 0.0)
 
 
 class Told(PostureController):
-    """Knows nothing but the margins that it is told."""
+    """Knows nothing but the margins and the progress that it is told."""
 
     margins = WIDE
+    progress: Progress | None = None
 
     def step(self, memory: PostureState, *_: object) -> tuple[PostureState, PostureFeedback]:
-        return memory, replace(NO_FEEDBACK, margins=self.margins)
+        return memory, replace(NO_FEEDBACK, margins=self.margins, progress=self.progress)
 
 
 def told(run: Run) -> Told:
