@@ -220,8 +220,8 @@ class PostureController:
             self._shift(stride, gait, plan.expected, measured, planned, beside, R_ground_base,
                         level if terrain.barred else LEVEL_FEET),
             np.array(self.placement.drift(
-                self.placement.yielding(p, stride.reference[0], gait.firm), measured, planned,
-                stride.activity.tolist(), sway.velocity)),
+                self.placement.yielding(p, stride.reference[0], gait.firm, plan.acceleration),
+                measured, planned, stride.activity.tolist(), sway.velocity)),
             np.array(correction), command, state.joint_position, forces,
             self._margins(R_ground_base, feet, stride, under, error),
             Progress((measured[0], measured[1]), feet_behind(

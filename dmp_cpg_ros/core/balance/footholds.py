@@ -22,7 +22,7 @@ ground, or without an estimate of it, the frame is level; of a slight slope it t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sqrt
+from math import hypot, sqrt
 
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.maths import Array, clamped, vec3
@@ -195,13 +195,15 @@ class FootPlacement:
             raised.append(clamped(gain * lost, -limit, limit))
         return raised
 
-    def yielding(self, p: PostureParameters, v_x: float, firm: float) -> float:
+    def yielding(self, p: PostureParameters, v_x: float, firm: float,
+                 acceleration: Pair = (0.0, 0.0)) -> float:
         """Share of an error of the velocity with which standing feet go along.
 
         Feet that hold a body which goes backwards roll it to one side, where it stays: they go
         along further, by ``BACKWARDS`` of what is left from a dimensionless speed of ``QUICK`` on.
         Not where all legs swing together: they pitch it the more the less they hold it; nor where
-        one side or one end stands alone, which they tilt the more.
+        one side or one end stands alone, which they tilt the more. And the less, the more a
+        planned acceleration is of μ g/√2: feet that go along do not hold a curve, and slide.
 
         Parameters
         ----------
@@ -210,13 +212,15 @@ class FootPlacement:
         v_x : float
             Reference [m/s].
         firm : float
-            Of the gait: 0 where all legs swing together, or one side or one end stands alone, else
-            1.
+            Of the gait: 0 where all legs swing together or one side or one end is alone, else 1.
+        acceleration : pair of float
+            Planned, with that of a curve [m/s^2].
         """
         if v_x >= 0.0:
             return p.yielding
         quick = min(1.0, -v_x / (QUICK * (GRAVITY * self._leg_length) ** 0.5))
-        return p.yielding + firm * BACKWARDS * quick * (1.0 - p.yielding)
+        held = min(1.0, sqrt(2.0) * hypot(*acceleration) / (p.friction * GRAVITY))
+        return p.yielding + (1.0 - held) * firm * BACKWARDS * quick * (1.0 - p.yielding)
 
     def drift(self, yielding: float, measured: Triple, planned: Triple,
               activity: Sequence[float], sway_velocity: float = 0.0) -> list[Pair]:

@@ -48,6 +48,18 @@ def test_feet_are_placed_where_the_legs_reach_and_on_their_own_side(
         assert np.allclose(kinematics.foot_in_base(kinematics.inverse(foot)), foot, atol=1e-9)
 
 
+@given(v_x=st.floats(-4.0, -0.01), shares=st.lists(st.floats(0.0, 2.0), min_size=2, max_size=2),
+       along=st.floats(-np.pi, np.pi))
+def test_feet_go_along_with_a_body_that_walks_backwards_the_less_the_harder_it_is_pushed(
+        v_x: float, shares: list[float], along: float) -> None:
+    most = P.friction * GRAVITY / 2.0 ** 0.5
+    less, more = (PLACEMENT.yielding(P, v_x, 1.0, (
+        share * most * np.cos(along), share * most * np.sin(along))) for share in sorted(shares))
+    assert P.yielding <= more <= less <= PLACEMENT.yielding(P, v_x, 1.0) <= 1.0
+    assert max(shares) < 1.0 or more == pytest.approx(P.yielding)
+    assert PLACEMENT.yielding(P, -v_x, 1.0, (most, 0.0)) == P.yielding
+
+
 @given(measured=velocities)
 def test_left_and_right_are_mirrored(measured: Triple) -> None:
     v_x, v_y, gamma = measured
