@@ -137,7 +137,6 @@ class PostureController:
         self.model = VirtualModel(description, self.scale.leg_length)
         self.placement = FootPlacement(self.kinematics, footholds, self.scale.leg_length)
         self.lanes = Lanes(description)
-        self._across: list[float] = footholds[:, 1].tolist()
         self._nominal = [vec3.triple(foot) for foot in footholds.tolist()]
         self._footholds = [
             vec3.triple(foot) for foot in (footholds - description.com_in_base).tolist()]
@@ -198,7 +197,9 @@ class PostureController:
             memory, stride, gait, R_ground_base, state.base_quaternion, velocity, dt)
         correction = integral.acting(p, leg_length, stride.moving)
         planned = vec3.plus(stride.reference, correction)
-        sway = self._sway(stride)
+        across = self.placement.across(
+            p.friction, self.model.height, 1.0 - stride.moving * (1.0 - gait.wide))
+        sway = self._sway(stride, across)
         measured = (velocity[0], velocity[1] - sway.velocity, rate[2])
         under = lean(upward, self.model.height)
         beside = self._beside(under, plan, offset)
@@ -217,8 +218,8 @@ class PostureController:
         return PostureState(stride.activity, integral, plan, offset, terrain), PostureFeedback(
             self._torque(body, legs, feet, stride, planned, self._bounce(gait, stride),
                          acceleration, terrain.empty),
-            self._shift(stride, gait, plan.expected, measured, planned, beside, R_ground_base,
-                        level if terrain.barred else LEVEL_FEET),
+            self._shift(stride, gait, plan.expected, measured, planned, beside, across,
+                        R_ground_base, level if terrain.barred else LEVEL_FEET),
             np.array(self.placement.drift(
                 self.placement.yielding(p, stride.reference[0], gait.firm, plan.acceleration),
                 measured, planned, stride.activity.tolist(), sway.velocity)),
@@ -263,17 +264,17 @@ class PostureController:
                 slope_lean * lean_y + outside * plan.curve[1] + aside_y)
 
     def _shift(self, stride: Stride, gait: GaitInForce, expected: Pair, measured: Triple,
-               planned: Triple, beside: Pair, R_ground_base: Matrix, level: Sequence[float]
-               ) -> Array:
+               planned: Triple, beside: Pair, across: Sequence[float], R_ground_base: Matrix,
+               level: Sequence[float]) -> Array:
         """Shift of the footholds of swinging feet, to their levels, ndarray (4, 3) [m]."""
         p, (beside_x, beside_y) = self.parameters, beside
         caught = self.placement.caught(measured, planned, gait.apart)
         lanes = self.lanes.aside(
             gait, (*expected, stride.reference[2]), stride.omega, stride.duty)
         shift = [
-            (along + beside_x, across + (beside_y + aside)) for (along, across), aside in zip(
-                self.placement.shift(p, caught, planned, pi * stride.duty / stride.omega), lanes,
-                strict=True)]
+            (x + beside_x, y + (beside_y + aside)) for (x, y), aside in zip(
+                self.placement.shift(p, caught, planned, pi * stride.duty / stride.omega,
+                                     across), lanes, strict=True)]
         raised = self.placement.raised(p, shift, R_ground_base)
         return np.array([part for (x, y), up, e in zip(shift, raised, level, strict=True)
                          for part in (x, y, up + e)]).reshape(-1, 3)
@@ -324,10 +325,10 @@ class PostureController:
         share = stride.moving / len(each)
         return Bounce(*(share * sum(values) for values in zip(*each, strict=True)))
 
-    def _sway(self, stride: Stride) -> virtual_model.LateralPlan:
+    def _sway(self, stride: Stride, across: Sequence[float]) -> virtual_model.LateralPlan:
         """Planned sway of the body; it fades with the legs' activity and with speed sideways."""
         sway = virtual_model.lateral_plan(
-            stride.positions, stride.duty, stride.omega, self._across, self.model.height)
+            stride.positions, stride.duty, stride.omega, across, self.model.height)
         if sway is virtual_model.STRAIGHT:
             return virtual_model.STRAIGHT
         sideways = abs(stride.reference[1]) / self.scale.speed(virtual_model.SIDEWAYS)

@@ -13,6 +13,13 @@ the foot stands, and beyond it the capture point of the linear inverted pendulum
 foot's own side of the body. The foot path brings the foot to v_plan T_s / 2, with v_plan the
 velocity of its stance; the rest is the shift.
 
+Where the feet of one side stand alone at y from the middle, their force points through the centre
+of mass at the height h with a friction of y/h, else it rolls the body. A foot comes down within
+
+    |y| ≤ μ h/√2
+
+of the middle then, with μ what is counted on: as much of the cone is left to push the body ahead.
+
 All this is in the frame of the ground (:func:`ground_from_base`): at the base, with its heading, z
 along the normal of the ground. A controller that works in this frame holds the body parallel to a
 slope, keeps its height along the normal, and its friction cones stand on the ground. On level
@@ -22,7 +29,7 @@ ground, or without an estimate of it, the frame is level; of a slight slope it t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, sqrt
+from math import copysign, hypot, sqrt
 
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.maths import Array, clamped, vec3
@@ -64,6 +71,7 @@ class FootPlacement:
                  leg_length: float) -> None:
         """Keep places and lengths."""
         self._footholds = [vec3.triple(foot) for foot in footholds_in_base.tolist()]
+        self._across = tuple(y for _, y, _ in self._footholds)
         self._leg_length = leg_length
         self._straight = [leg.thigh_length + leg.shank_length for leg in kinematics]
         self._lateral = [leg.lateral_offset for leg in kinematics]
@@ -86,6 +94,29 @@ class FootPlacement:
         """
         v_x, v_y, gamma = velocity
         return [(v_x - gamma * y, v_y + gamma * x) for x, y, _ in self._footholds]
+
+    def across(self, friction: float, height: float, wide: float) -> tuple[float, ...]:
+        """Where feet come down across the body: nearer to the middle where one side is alone.
+
+        Parameters
+        ----------
+        friction : float
+            μ.
+        height : float
+            Of the centre of mass over the ground [m].
+        wide : float
+            Of the gait: 1 where feet of both sides stand, 0 where one side stands alone.
+
+        Returns
+        -------
+        tuple of four floats
+            To the left of the middle [m].
+        """
+        if wide == 1.0:
+            return self._across
+        most = friction * height / sqrt(2.0)
+        return tuple(copysign(abs(y) - (1.0 - wide) * max(0.0, abs(y) - most), y)
+                     for y in self._across)
 
     def room(self, reach: float) -> float:
         """Way that the body can make over standing feet with a share of the straight legs [m]."""
@@ -142,7 +173,7 @@ class FootPlacement:
         return reached
 
     def shift(self, p: PostureParameters, measured: Triple, planned: Triple,
-              half_stance: float) -> list[Pair]:
+              half_stance: float, across: Sequence[float] | None = None) -> list[Pair]:
         """Shift of the footholds.
 
         Parameters
@@ -153,6 +184,8 @@ class FootPlacement:
             Velocity of the body, and v_plan: v_x, v_y [m/s], γ [rad/s].
         half_stance : float
             T_s / 2 [s].
+        across : sequence of four floats, optional
+            As from :meth:`across`; the neutral places without.
 
         Returns
         -------
@@ -165,6 +198,9 @@ class FootPlacement:
             (way * x - capture * planned_x, way * y - capture * planned_y)
             for (x, y), (planned_x, planned_y) in zip(
                 self.over_feet(measured), wanted, strict=True)]
+        if across is not None and across != self._across:
+            wished = [(x, y + (at - place)) for (x, y), at, place in zip(
+                wished, across, self._across, strict=True)]
         return [
             (x - half_stance * planned_x, _on_own_side(y, place) - half_stance * planned_y)
             for (x, y), (planned_x, planned_y), (_, place, _) in zip(

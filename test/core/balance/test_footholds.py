@@ -48,6 +48,21 @@ def test_feet_are_placed_where_the_legs_reach_and_on_their_own_side(
         assert np.allclose(kinematics.foot_in_base(kinematics.inverse(foot)), foot, atol=1e-9)
 
 
+@given(measured=velocities, friction=st.floats(0.05, 2.0), wide=st.floats(0.0, 1.0))
+def test_feet_of_one_side_that_stand_alone_are_within_what_friction_bears_of_the_middle(
+        measured: Triple, friction: float, wide: float) -> None:
+    most, own = friction * LEG_LENGTH / 2.0 ** 0.5, FEET[:, 1]
+    alone, across, apart = (np.array(PLACEMENT.across(friction, LEG_LENGTH, of))
+                            for of in (0.0, wide, 1.0))
+    assert np.allclose(np.abs(alone), np.minimum(np.abs(own), most)) and (apart == own).all()
+    assert np.allclose(across, alone + wide * (own - alone))
+    assert np.all(across * own > 0.0)
+    down = own + np.array(PLACEMENT.shift(P, measured, AT_REST, 0.1, tuple(across.tolist())))[:, 1]
+    assert np.all(down * own >= -1e-12)
+    at_rest = np.array(PLACEMENT.shift(P, AT_REST, AT_REST, 0.1, tuple(across.tolist())))
+    assert np.allclose(own + at_rest[:, 1], across)
+
+
 @given(v_x=st.floats(-4.0, -0.01), shares=st.lists(st.floats(0.0, 2.0), min_size=2, max_size=2),
        along=st.floats(-np.pi, np.pi))
 def test_feet_go_along_with_a_body_that_walks_backwards_the_less_the_harder_it_is_pushed(
