@@ -306,12 +306,12 @@ class PostureController:
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], stride: Stride,
                  under: Pair, error: Pair) -> tuple[float, ...]:
         """Margins of the capture point with an error of the velocity [m/s]; legs that swing count
-        at their footholds.
+        at their footholds, which a slope has downhill.
         """
-        places = []
+        places, downhill, slope_lean = [], (*under, 0.0), self.parameters.slope_lean
         for foot, foothold, swing in zip(
                 feet, self._footholds, stride.activity.tolist(), strict=True):
-            place = vec3.times(R_ground_base, foothold)
+            place = vec3.moved(vec3.times(R_ground_base, foothold), downhill, slope_lean)
             places.append(vec3.moved(foot, vec3.minus(place, foot), swing))
         return support_margins(
             places, under, error, self.model.height, self.parameters.friction, self._room)
