@@ -46,9 +46,6 @@ STRIDING = 1.0
 and slow feet step into every gap.
 """
 
-FALLING = 0.1
-"""How far it is out, in lengths of the leg; over a gap the leg that hangs takes it to the edge."""
-
 OUTWARD = ((1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (0.0, 1.0))
 """Directions out of the support over its edges: front, right, rear, left."""
 
@@ -83,9 +80,9 @@ def room(margins: Sequence[float] | None, leg_length: float, wide: float) -> flo
     return min(margins) / (q * leg_length)
 
 
-def falls(margins: Sequence[float] | None, r: Sequence[float], leg_length: float) -> bool:
-    """Whether the capture point has left the support by ``FALLING`` l, over an edge that the way
-    does not leave behind; a body that goes on helps itself there no more.
+def falls(margins: Sequence[float] | None, r: Sequence[float]) -> bool:
+    """Whether the capture point has left the support over an edge that the way does not leave
+    behind; a body that goes on helps itself there no more.
 
     Parameters
     ----------
@@ -93,12 +90,10 @@ def falls(margins: Sequence[float] | None, r: Sequence[float], leg_length: float
         To the edges of the support polygon, where they are known [m].
     r : sequence of 3 float
         Reference v_x, v_y [m/s], γ [rad/s].
-    leg_length : float
-        l [m].
     """
     trailing = -TRAILING * hypot(r[0], r[1])
     return margins is not None and any(
-        margin < -FALLING * leg_length and x * r[0] + y * r[1] >= trailing
+        margin < 0.0 and x * r[0] + y * r[1] >= trailing
         for margin, (x, y) in zip(margins, OUTWARD, strict=True))
 
 

@@ -201,7 +201,7 @@ class GaitSupervisor:
         Feet need time on rough ground, but after a push or when the body falls.
         """
         p, leg = self.parameters, network.scale.leg_length
-        left, falling = room(margins, leg, network.gait.wide), falls(margins, r.tolist(), leg)
+        left, falling = room(margins, leg, network.gait.wide), falls(margins, r.tolist())
         predicted = state.requested or state.state == 'releasing'
         share, most = 1.0, min(most, state.block.most)
         if not (predicted or state.push.acts):

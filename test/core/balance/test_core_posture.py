@@ -213,6 +213,26 @@ def test_on_a_slope_parallel_to_it_the_feet_carry_the_weight(slope: tuple[float,
     assert ((feedback.shift_in_base[:, :2] @ downhill) > 0.15 * 0.2).all()
 
 
+@pytest.mark.parametrize('slope', [(0.25, 0.0), (-0.2, 0.0), (0.0, 0.2), (0.0, -0.3)])
+def test_feet_that_walk_on_a_slope_hold_the_body_as_on_level_ground(slope: tuple[float, float]
+                                                                    ) -> None:
+    """They come down as far downhill as the vertical through it meets the ground; standing ones
+    stay where they are.
+    """
+    of, x, level = controller(), network().locked_state(), standing_state(ROBOT)
+    normal = np.array(normal_in_world(slope))
+    axis = np.cross((0.0, 0.0, 1.0), normal)
+    turn = axis / np.linalg.norm(axis) * np.arccos(normal[2])
+    leaning = replace(level, base_quaternion=turned(level.base_quaternion, turn),
+                      ground_normal_in_world=normal)
+    walking = of.initial_state()._replace(activity=np.ones(4))
+    (flat, steep), (_, stood) = ([
+        np.array(of.step(memory, state, AMBLE, x, 0.0 * x, np.zeros(3), TICK)[1].margins)
+        for state in (level, leaning)] for memory in (walking, of.initial_state()))
+    np.testing.assert_allclose(steep, flat, atol=0.01)
+    assert (flat - stood).max() > 0.03
+
+
 @given(seed=st.integers(0, 10_000), size=st.floats(0.0, 20.0), gait=st.sampled_from(list(GAITS)))
 def test_torques_and_shifts_are_finite_and_within_limits_in_any_state(
         seed: int, size: float, gait: str) -> None:

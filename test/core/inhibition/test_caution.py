@@ -16,7 +16,6 @@ from dmp_cpg_ros.core.inhibition.caution import (
     CLIMBING,
     DISTURBED,
     EASY,
-    FALLING,
     LEAST,
     REGAIN,
     STRIDING,
@@ -46,13 +45,13 @@ def test_the_share_falls_with_the_least_margin_and_comes_back_at_its_rate() -> N
 @pytest.mark.parametrize('way', [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.3), (0.0, -0.3), (0.4, 0.4)])
 def test_a_body_falls_over_edges_that_its_way_does_not_leave_behind(way: tuple[float, float]
                                                                     ) -> None:
-    r, out = (*way, 0.0), -FALLING * 0.3
-    assert not (falls(None, r, 0.3) or falls(WIDE, r, 0.3) or falls((0.9 * out,) * 4, r, 0.3))
+    r = (*way, 0.0)
+    assert not (falls(None, r) or falls(WIDE, r) or falls((0.001,) * 4, r))
     beyond = ((1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (0.0, 1.0))  # front, right, rear, left
     for i, edge in enumerate(beyond):
         margins = [0.1] * 4
-        margins[i] = 1.1 * out
-        assert falls(margins, r, 0.3) == (np.dot(edge, way) > -0.6 * np.hypot(*way))
+        margins[i] = -0.001
+        assert falls(margins, r) == (np.dot(edge, way) > -0.6 * np.hypot(*way))
 
 
 @pytest.mark.parametrize(('felt', 'share'), [
