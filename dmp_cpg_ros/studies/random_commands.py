@@ -179,8 +179,8 @@ def choice(rng: np.random.Generator, gaits: Sequence[str]) -> dict[str, Any]:
 
 
 def drawn_gaits(seed: int) -> dict[str, Gait]:
-    """Three gaits of which each leg lags by anything or by twelfths of a cycle, at 0.3 to 0.75
-    cycles, dimensionless, and stands for 0.5 to 0.8 of them.
+    """Three gaits by name, equal for equal seeds: each leg lags by anything or by twelfths of a
+    cycle, the cadence is 0.3 to 0.75 √(g/l), and a foot stands for 0.5 to 0.8 of a cycle.
     """
     rng, gaits = np.random.default_rng(seed), dict[str, Gait]()
     for name in DRAWN:
@@ -310,9 +310,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--runs', type=output.at_least_one, default=20, metavar='N')
     parser.add_argument('--seconds', type=float, default=60.0, help='of each walk (default: 60)')
     parser.add_argument('--robot', metavar='FILE', help="robot file (default: the suite's own)")
-    parser.add_argument('--gaits', nargs='+', metavar='GAIT', help="gaits to change among, of the "
-                        "parameter file's gaits_file (default: all of them)")
-    parser.add_argument('--drawn-gaits', action='store_true', help='gaits that are drawn instead')
+    gaits = parser.add_mutually_exclusive_group()
+    gaits.add_argument('--gaits', nargs='+', metavar='GAIT', help="gaits to change among, of the "
+                       "parameter file's gaits_file (default: all of them)")
+    gaits.add_argument('--drawn-gaits', action='store_true', help='gaits that are drawn instead')
     parser.add_argument('--changes', action='store_true', help='parameters change, and the robot '
                         'lies down and stands up, meanwhile')
     parser.add_argument('--auto-gait', action='store_true', help='the gait is chosen by speed')

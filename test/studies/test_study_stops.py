@@ -162,7 +162,7 @@ def test_a_body_stands_when_it_was_told_to(gait: str, speed: float) -> None:
 @pytest.mark.parametrize(('seed', 'speed'), [(102, 0.24), (104, 0.43)])
 def test_the_body_of_a_robot_of_any_size_stands_when_it_was_told_to(
         seed: int, speed: float, tmp_path: Path) -> None:
-    """Legs of 0.18 and 0.57 m: what holds for one of 0.34 m is a third too long or too short."""
+    """0.15 and 0.47 m high: the times of one of 0.28 m are too long and too short by more."""
     file = tmp_path / 'suite.yaml'
     file.write_text(f"/**: {{ros__parameters: {{robot: '{robot_file(seed, tmp_path)}'}}}}\n")
     cases = [StopCase('amble', speed, phase, resumes=False) for phase in (0.0, 0.5)]

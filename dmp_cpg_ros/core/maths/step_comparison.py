@@ -188,7 +188,9 @@ class StepComparison:
 
 
 def step_comparison(M: Array, dt: float) -> StepComparison:
-    """:class:`StepComparison`, or the last that was made of the same."""
+    """:class:`StepComparison` of M (n, n) [1/s] and dt [s], kept: of a change of parameters most
+    steps have the same.
+    """
     return _kept(len(M), np.asarray(M, dtype=float).tobytes(), dt)
 
 
