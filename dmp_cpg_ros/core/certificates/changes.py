@@ -38,8 +38,8 @@ from dmp_cpg_ros.core.voting.parameters import VotingParameters
 
 def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,
                     tick_s: float, acting_cadence: float | None = None, *,
-                    required_only: bool = False, until_lost: bool = False, until: str = ''
-                    ) -> Certificate:
+                    required_only: bool = False, until_lost: bool = False, until: str = '',
+                    every_gait: bool = True) -> Certificate:
     """Compute the certificate of some gaits and of every change between them.
 
     Parameters
@@ -56,6 +56,8 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
         Factor on the cadence that still acts, on its way to that of the parameters.
     required_only, until_lost, until : bool, bool, str
         As for :func:`~dmp_cpg_ros.core.certificates.certify.certify`.
+    every_gait : bool
+        Whether votes are looked at in the other gaits where one loses an inequality.
 
     Returns
     -------
@@ -88,7 +90,7 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
             for row in whole.inequalities]
     rows = discharged(rows, alike=replace(setting, parameters=p).alike)
     if until != BEFORE_VOTES and not (required_only and lost(rows)):
-        rows += votes_among(p, networks, tick_s, spans, until_lost=until_lost)
+        rows += votes_among(p, networks, tick_s, spans, until_lost=until_lost or not every_gait)
     if ways and not required_only:
         rows.append(Inequality(
             'offset_rate', share * span.omega[1], whole['frequency_mismatch'].right, 'rad/s',

@@ -16,7 +16,7 @@ from dmp_cpg_ros.core.canonical.coupling import degrees
 from dmp_cpg_ros.core.canonical.inhibition import AUTO, Inhibition
 from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, OSCILLATOR_ROWS, certify
 from dmp_cpg_ros.core.certificates.changes import all_networks, certify_changes, votes_among
-from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, lost
+from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, Look
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.timing import later_arming
 from dmp_cpg_ros.core.certificates.votes import VOTE_ROWS
@@ -79,26 +79,25 @@ class Running:
     others: tuple[Gait, ...] = ()
     acting_cadence: float | None = None
 
-    def certificate(self, *, whole: bool = False) -> Certificate:
+    def certificate(self, *, whole: bool = False, every_gait: bool = True) -> Certificate:
         """Compute the inequalities, of those that are not required only where the whole is asked
-        for, or take them from the last that were; the way of the feet has no part in them.
+        for, or take them from the last that were; the way of the feet has no part in them. Where
+        not every gait matters, votes are those of the first gait in which they lose one.
         """
-        return _certificate(self._of_certificate, whole)
+        return _certificate(self._of_certificate, whole, every_gait=every_gait)
 
     def holds(self) -> bool:
         """Whether the certificate holds, at less cost where it does not."""
-        return not self.first_lost()
+        return not self.look().lost
 
-    def first_lost(self, among: str = '') -> str:
-        """Name of a required inequality that does not hold; empty when all do. Where one is named,
-        only it and what is computed before it are sure to be looked at.
+    def look(self, among: str = '') -> Look:
+        """Whether a required inequality does not hold, looking no further than one that does not.
+        Where one is named, only it and what is computed before it are sure to be looked at.
         """
         if among in VOTE_ROWS:
-            failing = lost(self.votes(until_lost=True))
-        else:
-            until = among if among in OSCILLATOR_ROWS else BEFORE_VOTES if among else ''
-            failing = _certificate(self._of_certificate, False, True, until).failing
-        return failing[0].name if failing else ''
+            return Look.at(self.votes(until_lost=True))
+        until = among if among in OSCILLATOR_ROWS else BEFORE_VOTES if among else ''
+        return Look.at(_certificate(self._of_certificate, False, True, until).inequalities)
 
     def votes(self, *, until_lost: bool = False) -> list[Inequality]:
         """Inequalities of voting, or all of the first gait in which one is lost."""
@@ -106,7 +105,7 @@ class Running:
         return votes_among(of.parameters, of.networks, of.tick_s, until_lost=until_lost)
 
     def effort(self, among: str = '') -> int:
-        """How long :meth:`first_lost` takes, mostly no longer; 1 is one of ``OSCILLATOR_ROWS`` for
+        """How long :meth:`look` takes, mostly no longer; 1 is one of ``OSCILLATOR_ROWS`` for
         one leg. ``auto`` takes as much for each leg that is not alike another, and votes some for
         each set of voters in each network.
         """
@@ -290,12 +289,12 @@ class Running:
 
 
 @lru_cache(maxsize=32)
-def _certificate(of: Running, whole: bool, until_lost: bool = False, until: str = ''
-                 ) -> Certificate:
+def _certificate(of: Running, whole: bool, until_lost: bool = False, until: str = '', *,
+                 every_gait: bool = True) -> Certificate:
     if of.others or of.moving:
         return certify_changes(
             of.parameters, (of.gait, *of.others), of.scale, of.tick_s, of.acting_cadence,
-            required_only=not whole, until_lost=until_lost, until=until)
+            required_only=not whole, until_lost=until_lost, until=until, every_gait=every_gait)
     network = GaitNetwork(of.parameters.canonical, of.gait, of.scale)
     return certify(Setting.of(network, of.parameters, of.tick_s),
                    required_only=not whole, until_lost=until_lost, until=until)

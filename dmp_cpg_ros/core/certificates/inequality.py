@@ -7,8 +7,9 @@ several of them make.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, GRADES, PROVED, SAMPLED, weakest
 from dmp_cpg_ros.core.errors import ParameterError
@@ -67,6 +68,17 @@ class Inequality:
         if math.isinf(self.left) and math.isinf(self.right):
             return -math.inf
         return self.right - self.left
+
+    @property
+    def share(self) -> float:
+        """Margin over the sum of both sides' sizes, −1 to 1; below 0 where it does not hold, ±∞
+        where a side is infinite or no number.
+        """
+        whole = abs(self.left) + abs(self.right)
+        if not whole < math.inf:
+            return math.inf if self.holds else -math.inf
+        return self.margin / whole if self.holds else min(
+            self.margin / max(whole, ROUNDING), -ROUNDING)
 
     @property
     def holds(self) -> bool:
@@ -133,6 +145,33 @@ def discharged(rows: Iterable[Inequality], *, alike: bool) -> list[Inequality]:
 def lost(rows: Iterable[Inequality]) -> tuple[Inequality, ...]:
     """Required inequalities that do not hold."""
     return tuple(row for row in rows if row.required and not row.holds)
+
+
+class Look(NamedTuple):
+    """What was seen of some inequalities.
+
+    Attributes
+    ----------
+    lost : tuple of str
+        Names of the required ones that do not hold.
+    shares : mapping of str to float
+        :attr:`Inequality.share` of each.
+    """
+
+    lost: tuple[str, ...]
+    shares: Mapping[str, float]
+
+    @classmethod
+    def at(cls, rows: Iterable[Inequality]) -> Look:
+        """Look at some."""
+        required = [row for row in rows if row.required]
+        return cls(tuple(row.name for row in required if not row.holds),
+                   {row.name: row.share for row in required})
+
+    def share(self, names: Iterable[str]) -> float:
+        """The least of those that do not hold, and of some others by their names."""
+        return min((self.shares[name] for name in (*self.lost, *names) if name in self.shares),
+                   default=math.inf)
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from dmp_cpg_ros.core.certificates.inequality import Certificate
-from dmp_cpg_ros.core.maths.roots import last_that_holds
+from dmp_cpg_ros.core.certificates.inequality import Certificate, Look
+from dmp_cpg_ros.core.maths.roots import sign_change
 
 if TYPE_CHECKING:
     from dmp_cpg_ros.core.certificates.gate import Running
@@ -25,6 +25,7 @@ GAIN_ROWS = ('synchronisation', 'contraction', 'capture', 'rest_in_region', 'tim
 
 _LARGEST_COUPLING, _LARGEST_INHIBITION = 1e4, 1e5
 _DIGITS = 4  # of a nearest value
+_NEAR = 0.02  # of one plus the share of the way that is left to the wanted values
 
 
 @dataclass(frozen=True)
@@ -89,8 +90,9 @@ def suggest_gains(running: Running) -> Suggestion | None:
 
 
 def nearest_values(numbers: Mapping[str, tuple[float, float]],
-                   lost: Callable[[dict[str, float], str], str], name: str,
-                   halved: Callable[[str], tuple[str, int]]) -> dict[str, float]:
+                   look: Callable[[dict[str, float], str], Look], name: str,
+                   ends: tuple[Look, Look], trials: Callable[[str], tuple[str, int]]
+                   ) -> dict[str, float]:
     """Values nearest to the wanted ones, on the straight way from those that run, that still work.
 
     What one inequality needs is looked for first, where it alone is easier to look at; then
@@ -100,33 +102,38 @@ def nearest_values(numbers: Mapping[str, tuple[float, float]],
     ----------
     numbers : mapping of str to (float, float)
         Names with the value that runs, which works, and the one that is asked for, which does not.
-    lost : callable (values, among) → str
-        Name of an inequality that values lose, empty when none; where one is named, others than
-        that need not be looked at.
+    look : callable (values, among) → Look
+        What is seen of the inequalities at some values; where one is named, others than that need
+        not be looked at.
     name : str
         An inequality that the wanted values lose.
-    halved : callable (name) → (str, int)
-        For a lost inequality, what is looked at on the way, it or all, and how often the way is
-        halved; 0 ends it with what runs.
+    ends : (Look, Look)
+        What is seen at the wanted values, which lose an inequality, and at those that run.
+    trials : callable (name) → (str, int)
+        For a lost inequality, what is looked at on the way, it or all, and how often at most; 0
+        ends it with what runs.
 
     Returns
     -------
     dict of str → float
-        Found by bisection of the way, and rounded towards those that run.
+        To ``_NEAR`` of the way where there are trials enough, rounded towards those that run.
     """
-    def between(share: float) -> dict[str, float]:
-        return {key: before + share * (after - before)
+    def between(to_go: float) -> dict[str, float]:
+        return {key: before + (1.0 - to_go) * (after - before)
                 for key, (before, after) in numbers.items()}
 
-    def kept(most: float, among: str, at: float) -> bool:
-        return at < most and not lost(between(at), among)
+    def room(among: str, names: tuple[str, ...], at: float) -> float:
+        return look(between(at - 1.0), among).share(names)
 
-    share = 1.0
-    while name and share > 0.0:
-        among, rounds = halved(name)
-        share = last_that_holds(partial(kept, share, among), 0.0, 1.0, rounds)
-        name = lost(between(share), '') if among and share > 0.0 else ''
-    return {key: _shortened(value, numbers[key][0]) for key, value in between(share).items()}
+    to_go, (seen, runs) = 0.0, ends
+    while seen.lost and to_go < 1.0:
+        among, most = trials(name)
+        known = seen.share(()), runs.share(seen.lost)
+        to_go = sign_change(partial(room, among, seen.lost), 1.0 + to_go, 2.0, _NEAR, known,
+                            slope=0.0, trials=most)[1] - 1.0
+        seen = look(between(to_go), '') if among and to_go < 1.0 else runs
+        name = seen.lost[0] if seen.lost else ''
+    return {key: _shortened(value, numbers[key][0]) for key, value in between(to_go).items()}
 
 
 def _shortened(value: float, towards: float) -> float:

@@ -8,7 +8,8 @@ and what works: near values on the straight way from the running numbers, the ot
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -18,7 +19,7 @@ from dmp_cpg_ros.core.canonical.inhibition import AUTO
 from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, OSCILLATOR_ROWS
 from dmp_cpg_ros.core.certificates.changes import refused_change
 from dmp_cpg_ros.core.certificates.gate import Running
-from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality
+from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, Look
 from dmp_cpg_ros.core.certificates.suggest import nearest_values
 from dmp_cpg_ros.core.certificates.votes import VOTE_ROWS
 from dmp_cpg_ros.core.contraction.voting import alike
@@ -27,8 +28,10 @@ from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.parameters import typed
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
-_ROUNDS = 5
-"""How often the way to what is refused is halved at most."""
+_MOST_LOOKS, _MOST_WHOLE = 8, 5
+"""How often values on the way to what is refused are looked at at most, in one inequality and in
+all.
+"""
 
 MOST_EFFORT = 24
 """Most :meth:`Running.effort` of a verdict that looks for what would work, for its time to stay
@@ -79,7 +82,7 @@ class Change:
     def verdict(self) -> Verdict:
         """Judge: accepted when no required inequality is lost, nor gets worse where it fails."""
         of, before = self.proposed, self.present
-        certificate = of.certificate()
+        certificate = of.certificate(every_gait=not self.held.holds)
         lost = [entry for entry in certificate.failing if self._worse(entry)]
         same = (of.gait, of.others) == (before.gait, before.others)
         refused = '' if same and lost else refused_change(
@@ -91,7 +94,7 @@ class Change:
         if not lost:
             return Verdict(certificate, of.settled.certificate(), True)
         reason = ' | '.join(entry.explained() for entry in lost)
-        nearest = self._nearest(max((entry.name for entry in lost), key=of.effort))
+        nearest = self._nearest(lost)
         return Verdict(certificate, None, False, f'{reason}; {nearest}')
 
     def _worse(self, entry: Inequality) -> bool:
@@ -122,10 +125,11 @@ class Change:
         return of.effort('' if name in VOTE_ROWS else BEFORE_VOTES) * (1 + others) + (
             name in VOTE_ROWS and not self.held.holds) * before.effort(name)
 
-    def _nearest(self, name: str) -> str:
-        """Nearest values that work, as text, where an inequality of a name is lost, of several the
-        one that is looked at with most effort.
+    def _nearest(self, lost: Sequence[Inequality]) -> str:
+        """Nearest values that work, as text, where inequalities are lost; the one that is looked
+        at with most effort is looked at first.
         """
+        name = max((entry.name for entry in lost), key=self.proposed.effort)
         looks = _Looks(MOST_EFFORT - self._judging(name))
         differences = self.present.differences(self.proposed)
         band = differences.pop('auto_hysteresis', None)  # goes with auto_speeds, certifies nothing
@@ -133,15 +137,17 @@ class Change:
         words = {name: pair[1] for name, pair in differences.items() if name not in numbers}
         with_words = self.present.changed(
             words if band is None else {**words, 'auto_hysteresis': band[1]})
-        if words and looks.first_lost(with_words, name if numbers else ''):
+        runs = looks.look(with_words, name if numbers else '') if words else Look.at(
+            self.held.inequalities)
+        if words and runs.lost:
             return self._choices(words, looks)
         if not (self.held.holds or words) or not numbers:
             return 'nothing nearer is known: the running parameters are not certified themselves'
         values = nearest_values(
-            numbers, lambda at, among: looks.first_lost(with_words.changed(at), among),
-            name, partial(looks.halved, with_words))
+            numbers, lambda at, among: looks.look(with_words.changed(at), among),
+            name, (Look.at(lost), runs), partial(looks.allowed, with_words))
         none = values == {name: before for name, (before, _) in numbers.items()}
-        if none and words and looks.first_lost(with_words):
+        if none and words and looks.look(with_words).lost:
             return self._choices(words, looks)
         if none and looks.spent:
             return _TOO_LONG
@@ -157,7 +163,7 @@ class Change:
                 changed = self.proposed.changed({name: choice})
                 kind = name, _alike(changed, choice) if name == 'inhibited_legs' else choice
                 if kind not in holds:
-                    holds[kind] = choice != asked and not looks.first_lost(changed)
+                    holds[kind] = choice != asked and not looks.look(changed).lost
                 if choice != asked and holds[kind]:
                     working.append(typed(choice))
             if working:
@@ -179,31 +185,35 @@ class _Looks:
     left: int
     spent: bool = False
 
-    def halved(self, running: Running, name: str) -> tuple[str, int]:
+    def allowed(self, running: Running, name: str) -> tuple[str, int]:
         """What to look at on the way to what loses an inequality, it where that is much less than
-        all, which has to be looked at in the end; and how often the way may be halved.
+        all, which has to be looked at in the end; and how often at most.
         """
         whole, alone = running.effort(), max(1, running.effort(name))
-        among, most = (name, (self.left - whole) // alone) if 2 * alone <= whole else (
-            '', self.left // whole)
+        among, most = (name, min((self.left - whole) // alone, _MOST_LOOKS)) if (
+            2 * alone <= whole) else ('', min(self.left // whole, _MOST_WHOLE))
         self.spent = self.spent or most < 1
-        return among, max(0, min(most, _ROUNDS))
+        return among, max(0, most)
 
-    def first_lost(self, running: Running, among: str = '') -> str:
-        """:meth:`Running.first_lost`, or that it is not known."""
+    def look(self, running: Running, among: str = '') -> Look:
+        """:meth:`Running.look`, or that it is not known."""
         if self.left < running.effort(among):
             self.spent = True
-            return 'unknown'
-        lost = _first_lost(running, among)
+            return _UNKNOWN
+        seen = _look(running, among)
+        lost = seen.lost[0] if seen.lost else ''
         self.left -= running.effort(lost if lost in OSCILLATOR_ROWS else among)
-        return lost
+        return seen
 
 
-def _first_lost(running: Running, among: str = '') -> str:
+_UNKNOWN = Look(('unknown',), {'unknown': -math.inf})
+
+
+def _look(running: Running, among: str = '') -> Look:
     try:
-        return running.first_lost(among)
-    except DmpCpgError as error:
-        return str(error)
+        return running.look(among)
+    except DmpCpgError:
+        return _UNKNOWN
 
 
 def _alike(running: Running, legs: tuple[str, ...]) -> tuple[Any, ...]:

@@ -34,12 +34,13 @@ def last_that_holds(holds: Callable[[float], bool], low: float, high: float, rou
 
 
 def sign_change(value: Callable[[float], float], low: float, high: float, precision: float,
-                ends: tuple[float, float] = (-inf, inf)) -> tuple[float, float]:
+                ends: tuple[float, float] = (-inf, inf), *, slope: float = 1.0,
+                trials: float = inf) -> tuple[float, float]:
     """Positive numbers between which something becomes positive, or 0, from one that is below 0.
 
     Goes where a straight line through the ends is 0 (Illinois), over the logarithm, or somewhat
-    beyond where one of slope 1 through the only end that has a value is. At every third trial, and
-    where values are infinite or jump, it halves the way.
+    beyond where one of a known slope through the only end that has a value is. At every third
+    trial, and where values are infinite or jump, it halves the way.
 
     Parameters
     ----------
@@ -51,6 +52,10 @@ def sign_change(value: Callable[[float], float], low: float, high: float, precis
         Share by which the ends differ at most.
     ends : (float, float)
         Values at low and high, where they are known.
+    slope : float
+        About how the value rises with the logarithm; 0 where it is not known.
+    trials : float
+        How often it is computed at most.
 
     Returns
     -------
@@ -58,14 +63,14 @@ def sign_change(value: Callable[[float], float], low: float, high: float, precis
         Either the ends that were given, or numbers at which the value is below 0, and not.
     """
     (below, above), least, trial, smooth = ends, 1.0 + 0.5 * precision, 0, True
-    while high > low * (1.0 + precision):
+    while high > low * (1.0 + precision) and trial < trials:
         trial, most, one = trial + 1, max(-below, above), min(-below, above)
         straight = smooth and trial % 3 > 0
         line = straight and most < inf
         middle = low * (high / low) ** (below / (below - above) if line else 0.5)
-        if straight and one < inf == most:
-            middle = low * exp(min(_BEYOND * one, _STEEPEST)) if above == inf else high * exp(
-                -min(_BEYOND * one, _STEEPEST))
+        if straight and one < inf == most and slope > 0.0:
+            way = exp(min(_BEYOND * one / slope, _STEEPEST))
+            middle = low * way if above == inf else high / way
         here = value(at := min(max(middle, low * least), high / least))
         if line:
             smooth = abs(here) <= 0.5 * most and (at == middle or (at < middle) == (here < 0.0))

@@ -15,7 +15,7 @@ from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify, spring_damper_contraction
 from dmp_cpg_ros.core.certificates.gate import Running
-from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality
+from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, Look
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.suggest import nearest_values, suggest_gains
 from dmp_cpg_ros.core.errors import ParameterError
@@ -185,15 +185,14 @@ def test_gains_are_suggested_for_all_gaits_that_are_walked() -> None:
 
 
 def test_the_nearest_value_that_works_works_and_a_little_further_does_not() -> None:
-    def lost(values: dict[str, float], among: str = '') -> str:
-        failing = [row.name for row in certificate(suite=with_inhibition(**values)).failing]
-        return among if among in failing else '' if among or not failing else failing[0]
+    def look(values: dict[str, float], among: str = '') -> Look:
+        rows = certificate(suite=with_inhibition(**values)).inequalities
+        return Look.at(row for row in rows if among in ('', row.name))
 
-    wanted = {'inhibition_gain': (400.0, 100.0)}
-    found = nearest_values(wanted, lost, lost({'inhibition_gain': 100.0}),
-                           lambda name: (name, 8))
-    assert not lost(found) and lost({'inhibition_gain': found['inhibition_gain'] - 1.2})
-    for among in ('synchronisation', ''):  # which holds everywhere, and all
-        assert found == nearest_values(
-            wanted, lost, 'synchronisation', lambda _, at=among: (at, 8))
+    ends = look({'inhibition_gain': 100.0}), look({})
+    for among in ('capture', ''):
+        found = nearest_values({'inhibition_gain': (400.0, 100.0)}, look, 'capture', ends,
+                               lambda _, at=among: (at, 9))
+        assert not look(found).lost
+        assert look({'inhibition_gain': found['inhibition_gain'] - 300.0 * 0.04}).lost
     assert PostureParameters() == SuiteParameters().posture

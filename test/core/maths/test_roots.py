@@ -50,3 +50,18 @@ def test_fewer_values_are_asked_for_than_by_halving_where_they_are_smooth() -> N
 
     sign_change(value, 0.01, 100.0, PRECISION)
     assert len(asked) < math.log2(math.log(1e4) / PRECISION)
+
+
+@pytest.mark.parametrize('kind', KINDS)
+@pytest.mark.parametrize('trials', range(5))
+def test_it_ends_after_some_trials_with_numbers_on_both_sides(kind: str, trials: int) -> None:
+    asked: list[float] = []
+
+    def value(at: float) -> float:
+        asked.append(at)
+        return KINDS[kind](math.log(at / 1.37))
+
+    ends = value(1.0), value(2.0)
+    below, not_below = sign_change(value, 1.0, 2.0, PRECISION, ends, slope=0.0, trials=trials)
+    assert len(asked) == 2 + trials
+    assert value(below) < 0.0 <= value(not_below)
