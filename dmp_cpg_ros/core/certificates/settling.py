@@ -1,0 +1,215 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Bound on the time that an inhibited network takes to settle, from any state in its capture set.
+
+The rates |ẋ_i| obey v̇ ≤ −(L + diag α − diag b) v + |∂f/∂ω| |ω̇| there (contraction applied to ẋ
+itself, driven by the reference's decay), and the swings' activity follows the phase rates through
+its filter. Where it is proved, the same is computed for the step that runs, by what it has moved.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from dmp_cpg_ros.core.certificates.network import Setting
+from dmp_cpg_ros.core.certificates.step import SteppedNetwork
+from dmp_cpg_ros.core.contraction.capture import CaptureSet
+from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
+from dmp_cpg_ros.core.contraction.hopf_bounds import growth, largest_radial
+from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian
+from dmp_cpg_ros.core.inhibition import supervisor
+from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.exponential import phi_functions
+from dmp_cpg_ros.core.reference.operating_range import REST_SPEED
+
+STEP = 0.01
+"""Length of a cell of time, or about that in whole steps [s]."""
+
+HORIZON = 10.0
+"""Time beyond which a bound is of no use [s]."""
+
+_BLOCK, _BLOCKS = 32, 4  # cells of a block, and blocks looked at at once
+_KEPT = 64  # of what does not depend on who is inhibited
+
+
+def settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed: float,
+             step: SteppedNetwork | None = None) -> float:
+    """Bound on the time from any state in the capture set to the thresholds of rest.
+
+    Parameters
+    ----------
+    s : Setting
+        What runs.
+    capture : CaptureSet
+        Invariant set under inhibition, which contracts.
+    rest : InhibitedEquilibrium
+        Equilibrium at zero reference.
+    speed : float
+        Of the reference at first [m/s].
+    step : SteppedNetwork, optional
+        What is proved of the step, where that is to be bounded and not the equation.
+
+    Returns
+    -------
+    float
+        [s]; infinite beyond ``HORIZON``.
+    """
+    r, span, N = s.network.parameters.radius, s.span, len(capture.distance)
+    alpha_r, a_b = s.parameters.reference.alpha_r, s.parameters.reference.braking
+
+    def drive(speed: Array) -> tuple[Array, Array]:
+        """|∂f/∂ω| |ω̇| and |∂f/∂ω| |ω − ω_rest|: sideways and turning count twice in the speed
+        that sets the cadence.
+        """
+        return (span.omega_slope * np.maximum(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r,
+                span.omega_slope * speed * r)
+
+    turning, away = map(float, drive(np.array(speed)))
+    of = _falling(s, capture, turning, away) if step is None else _falling_in_steps(
+        s, capture, step)
+    fade, cells = math.exp(-alpha_r * of.cell), int(HORIZON / of.cell)
+    if a_b == 0.0 and not speed * fade ** (cells - 1) <= 1.001 * REST_SPEED:
+        return math.inf
+    swings = _filtered(math.exp(-s.parameters.leg.activity_rate * of.cell))
+    carried, fed = _in_a_block(of)
+    bounds, activity = of.start, np.ones((1, N))
+    for begin in range(0, cells, _BLOCKS * _BLOCK):
+        speeds, speed = _slowing(speed, fade, a_b * of.cell)
+        within, swinging = list[Array](), list[Array]()
+        for driven in np.stack(drive(speeds), axis=1).reshape(_BLOCKS, -1):
+            block = (carried @ bounds + fed @ driven).reshape(_BLOCK + 1, -1)
+            within.append(block[:-1, -2 * N:])
+            bounds = block[-1]
+        v, e = np.concatenate(within).reshape(-1, 2, N).swapaxes(0, 1)
+        inner = np.maximum(of.inner, rest.radius - e)
+        phase_rate = np.divide(v, inner, out=np.full_like(v, np.inf), where=inner > 1e-12)
+        for wanted in np.minimum(1.0, phase_rate / span.omega_armed[0]).reshape(
+                _BLOCKS, _BLOCK, N):
+            block = swings @ np.concatenate([activity, wanted])
+            swinging.append(block[:-1])
+            activity = block[-1:]
+        resting = np.flatnonzero(
+            (phase_rate.max(axis=1) <= supervisor.REST_PHASE_RATE)
+            & (speeds <= REST_SPEED)
+            & (np.concatenate(swinging).max(axis=1) <= supervisor.REST_ACTIVITY))
+        if len(resting) > 0:
+            cell = begin + int(resting[0])
+            return cell * of.cell if cell < cells else math.inf
+    return math.inf
+
+
+class _Falling(NamedTuple):
+    """How bounds fall in a cell of time, and what ω̇ and ω feed them.
+
+    Attributes
+    ----------
+    cell : float
+        Its length [s].
+    start : ndarray (n,)
+        Bounds at first; the last 2N are those of |ẋ_i| and of the distance from rest.
+    carry : ndarray (n, n)
+        Of bounds in a cell.
+    turning, away : ndarray (n,)
+        What r |ω̇| and r times what ω is off that of rest add to them [s].
+    inner : ndarray (N,)
+        Smallest |x_i| in the set.
+    """
+
+    cell: float
+    start: Array
+    carry: Array
+    turning: Array
+    away: Array
+    inner: Array
+
+
+def _fastest(s: Setting, gains: Array, u: Array, disc: float) -> Array:
+    """Bound of |ẋ_i| in a box and a disc, ndarray (N,)."""
+    system, r, degree = s.network.system, s.network.parameters.radius, np.diag(
+        comparison_laplacian(s.network.system.graph))
+    return np.asarray(
+        s.span.omega_armed[1] * disc + largest_radial(float(system.rho[0]), r, disc)
+        + gains * u + degree * (u + u.max()))
+
+
+def _falling(s: Setting, capture: CaptureSet, turning: float, away: float) -> _Falling:
+    """Of the differential equation."""
+    system, u = s.network.system, capture.distance
+    K = comparison_laplacian(system.graph) + np.diag(capture.gains) - np.diag(
+        growth(system.rho, system.radius, capture.smallest_radius))
+    phi, none = phi_functions(-K * STEP, 1), np.zeros_like(K)
+    feed, idle = STEP * phi[1].sum(axis=1), none[0]
+    shape = np.linalg.solve(K, np.ones(len(K)))              # K shape = 1: bounds above it fall
+    fastest = _fastest(s, capture.gains, u, s.network.parameters.radius)
+    start = np.concatenate([max(float((fastest / shape).max()), turning) * shape,
+                            max(float((2.0 * u / shape).max()), away) * shape])
+    return _Falling(STEP, start, np.block([[phi[0], none], [none, phi[0]]]),
+                    np.concatenate([feed, idle]), np.concatenate([idle, feed]),
+                    capture.smallest_radius)
+
+
+def _falling_in_steps(s: Setting, capture: CaptureSet, step: SteppedNetwork) -> _Falling:
+    """Of the step, some of which make a cell; what it has moved is bounded too."""
+    r, u, none = s.network.parameters.radius, step.distance, np.zeros_like(step.moved)
+    fastest, idle = _fastest(s, capture.gains, u, step.disc), none[0]
+    start = np.concatenate([np.minimum(2.0 * u, step.moved @ fastest), fastest, 2.0 * u])
+    each = np.block([[step.differences, none, none], [*step.rates, none],
+                     [none, none, step.differences]])
+    kicks = np.stack([
+        np.concatenate([step.forced, np.full(len(u), step.disc / r), idle]) * step.step_s,
+        np.concatenate([idle, idle, step.forced])], axis=1)
+    carry, feed = np.eye(len(each)), 0.0 * kicks
+    count = max(1, round(STEP / step.step_s))
+    for _ in range(count):
+        carry, feed = each @ carry, each @ feed + kicks
+    return _Falling(count * step.step_s, start, carry, feed[:, 0], feed[:, 1],
+                    np.maximum(r - u, 0.0))
+
+
+def _in_a_block(of: _Falling) -> tuple[Array, Array]:
+    """Matrices that make of bounds, and of what feeds them in each cell of a block, those at the
+    ends of all its cells, the first included.
+    """
+    n, carry = len(of.start), of.carry
+    powers = np.eye(n)
+    while len(powers) < _BLOCK * n:
+        powers, carry = np.concatenate([powers, powers @ carry]), carry @ carry
+    fed = np.zeros((_BLOCK + 1, n, 2))                           # the last: of cells to come
+    fed[:_BLOCK] = (powers @ np.stack([of.turning, of.away], axis=1)).reshape(_BLOCK, n, 2)
+    return np.concatenate([powers, carry]), fed.swapaxes(0, 1)[:, _SINCE].swapaxes(0, 1).reshape(
+        (_BLOCK + 1) * n, 2 * _BLOCK)
+
+
+_CELLS = np.arange(_BLOCK + 1)
+_LATER = _CELLS[:, None] - _CELLS
+_SINCE = np.where(_LATER > 0, _LATER - 1, _BLOCK)[:, :-1]
+"""Cells between one of a block that is fed and the end of another, ndarray (_BLOCK + 1, _BLOCK);
+_BLOCK where that comes first.
+"""
+
+
+@lru_cache(maxsize=_KEPT)
+def _slowing(speed: float, fade: float, drop: float) -> tuple[Array, float]:
+    """Speeds in the cells of the blocks that are looked at at once, and after them, where a cell
+    leaves a share or takes so much away [m/s].
+    """
+    speeds = list[float]()
+    for _ in range(_BLOCKS * _BLOCK):
+        speeds.append(speed)
+        speed = max(0.0, min(speed * fade, speed - drop))
+    return np.array(speeds), speed
+
+
+@lru_cache(maxsize=_KEPT)
+def _filtered(kept: float) -> Array:
+    """Matrix that makes of the first value of a filter and what it follows in each cell of a block
+    its values at the ends of all cells, the first included.
+    """
+    weights = np.where(_LATER >= 0, (1.0 - kept) * kept ** np.maximum(_LATER, 0), 0.0)
+    weights[:, 0] = kept ** _CELLS
+    return weights
