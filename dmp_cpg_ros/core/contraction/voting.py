@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
 from dmp_cpg_ros.core.contraction.capture import (
     CaptureSet,
     outward_growth_within,
@@ -146,7 +146,8 @@ def relieved(system: CanonicalSystem, capture: CaptureSet, growth: Array, region
                     np.where(held, capture.gains * borne / region_radius, np.nan))
 
 
-def different_voters(system: CanonicalSystem, count: int) -> list[tuple[int, ...]]:
+@lru_cache(MOST_KEPT)
+def different_voters(system: CanonicalSystem, count: int) -> tuple[tuple[int, ...], ...]:
     """Sets of voters that the network can tell apart, of every size one for each orbit.
 
     Two sets behave alike when a symmetry of the network, seen in locked coordinates, takes one
@@ -162,12 +163,12 @@ def different_voters(system: CanonicalSystem, count: int) -> list[tuple[int, ...
 
     Returns
     -------
-    list of tuple of int
+    tuple of tuple of int
         Empty for no voters.
     """
     sets = combinations(range(system.graph.size), count) if count > 0 else ()
     turns = _turns(system)
-    return [voters for voters in sets if voters == _first(turns, voters)]
+    return tuple(voters for voters in sets if voters == _first(turns, voters))
 
 
 def alike(system: CanonicalSystem, nodes: Sequence[int]) -> tuple[int, ...]:
@@ -190,7 +191,7 @@ def _turns(system: CanonicalSystem) -> Sequence[tuple[int, ...]]:
                        np.stack([system.rho, system.radius], axis=1).tobytes())
 
 
-@lru_cache(32)
+@lru_cache(MOST_KEPT)
 def _symmetries(size: int, couplings: bytes, kinds: bytes) -> list[tuple[int, ...]]:
     """Permutations of the nodes that leave couplings and oscillators as they are."""
     L, each = np.frombuffer(couplings), np.frombuffer(kinds).reshape(size, 2)

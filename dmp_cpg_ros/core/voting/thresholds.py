@@ -174,12 +174,12 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
         return relieved(system, replace(box, gains=_votes(system, voters, alpha)), growth,
                          region_radius)
 
-    def spare(alpha: float) -> float:
-        found = together(alpha)
+    def spare(alpha: float, found: Relieved | None) -> float:
         return log(max(alpha / needed, found.spare / (1.0 + SPARE) if found else 0.0))
 
     def room(alpha: float) -> float:
-        beyond, found = spare(alpha), together(alpha)
+        found = together(alpha)
+        beyond = spare(alpha, found)
         capture = replace(box, gains=_votes(system, voters, alpha), rate=-np.inf)
         if beyond >= 0.0 and found is not None and not capture.holds:
             beyond = found.kept(box.tolerance, region_radius)
@@ -193,7 +193,7 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
     if known > 0.0 and (known == np.inf or room(known) >= 0.0):
         return known
     scale = _scale(system, omega, region_radius)
-    low = _threshold(spare, scale, lowest=known)[1]
+    low = _threshold(lambda alpha: spare(alpha, together(alpha)), scale, lowest=known)[1]
     if low == np.inf or (below := room(low)) >= 0.0:
         return low
     alone = needed * (1.0 + _PRECISION)

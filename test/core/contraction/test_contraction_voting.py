@@ -94,7 +94,7 @@ def test_the_threshold_of_a_majority_is_as_close_with_couplings_too_weak_for_one
 def test_voters_that_a_symmetry_exchanges_count_once(name: str, sizes: list[int]) -> None:
     system = network(name, 50.0)
     assert [len(different_voters(system, count)) for count in (1, 2, 3, 4)] == sizes
-    assert different_voters(system, 0) == []
+    assert different_voters(system, 0) == ()
     for count in (1, 2, 3):
         chosen = different_voters(system, count)
         of_chosen = {round(rest_threshold(system, OMEGA, v, REGION), 3) for v in chosen}
