@@ -190,8 +190,8 @@ def outward_growth_within(system: CanonicalSystem, omega: Array, D: float, u: Ar
     maxima where c leaves or reaches ±|x_d|, or where |x| = r/√3 with x along x_d.
     """
     r = system.radius
-    if np.all(r == D) and np.all(u <= 4.0 / 3.0 * D):
-        return outward_growth(system, omega, D, u)
+    if (r == D).all() and u.max() <= 4.0 / 3.0 * D:
+        return np.asarray(np.abs(omega) * D + 0.125 * system.rho * (u * u * u))
     reach = r / np.sqrt(3.0)
     root = np.sqrt(np.maximum(4.0 * D**2 + 3.0 * (r**2 - D**2), 0.0))
     places = np.stack([u, 0.0 * r, reach - D, reach + D, (root - 2.0 * D) / 3.0,
@@ -249,12 +249,14 @@ def _distances(system: CanonicalSystem, L: Array, omega: Array, inhibited: Mask,
 
 def _grounded_solution(L: Array, free: Mask) -> Callable[[Array, Array], Array]:
     """Solver of (L u)_i = g_i at the free nodes, u kept at the others; ∞ where unbounded."""
-    heard = ~free
+    heard, beside = ~free, L < 0.0
     for _ in range(len(L)):
-        heard = heard | ((L < 0.0) @ heard)
+        if heard.all():
+            break
+        heard = heard | (beside @ heard)
     known, any_free = bool(np.all(heard)), bool(np.any(free & heard))
     free, kept = free & heard, ~free & heard
-    grounded, beside = L[np.ix_(free, free)], L[np.ix_(free, kept)]
+    grounded, to_kept = L[free][:, free], L[free][:, kept]
     firm = known and any_free and slowest_rate(grounded) > 1e-9 * float(np.abs(grounded).max())
 
     inverse = np.linalg.inv(grounded) if firm else None
@@ -262,7 +264,7 @@ def _grounded_solution(L: Array, free: Mask) -> Callable[[Array, Array], Array]:
     def solution(g: Array, u: Array) -> Array:
         solved = np.where(heard, u, np.inf)                 # no kept node acts on the others
         if known and any_free:
-            solved[free] = np.inf if inverse is None else inverse @ (g[free] - beside @ u[kept])
+            solved[free] = np.inf if inverse is None else inverse @ (g[free] - to_kept @ u[kept])
         return solved
 
     return solution
