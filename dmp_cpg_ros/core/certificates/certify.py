@@ -76,8 +76,9 @@ def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = Fal
     p, votes = s.parameters.inhibition, cache(partial(vote_inequalities, s))  # of all legs alike
     if not p.auto:
         return _certificate(s, required_only, until_lost, until, votes)
-    legs = legs or eligible_legs(s.network, p)
     number = degrees(s.network.parameters.coupling_graph, len(LEGS))
+    legs = legs or ((s.network.parameters.first_leg,) if until_lost and len(set(number)) == 1
+                    else eligible_legs(s.network, p))
     found = []
     for leg in {number[leg]: leg for leg in legs}.values():       # others are alike
         found.append(_certificate(replace(s, parameters=replace(

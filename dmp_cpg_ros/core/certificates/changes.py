@@ -14,9 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import combinations, zip_longest
 
+from dmp_cpg_ros.core.canonical.coupling import degrees
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.system import MOST_KEPT
 from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, certify
 from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, discharged, lost
 from dmp_cpg_ros.core.certificates.network import Setting
@@ -72,14 +75,15 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
     p, rate = parameters, parameters.gait_change.gait_change_rate
     networks, cadence = all_networks(p, gaits, scale, acting_cadence), p.canonical.cadence_scale
     arriving = abs((acting_cadence or cadence) - cadence) / CADENCE_RATE
-    ways = [GaitTransition(one, other) for one, other in combinations(gaits, 2)]
-    share = max((way.fastest(rate) for way in ways), default=0.0)
+    ways = list(combinations(gaits, 2))
+    share = max((_fastest(*way, rate) for way in ways), default=0.0)
     spans = [operating_range(network, p.inhibition, p.reference) for network in networks]
     span = _widened(spans, share)
     unvoted = replace(p, voting=VotingParameters())
     setting = Setting.of(networks[0], unvoted, tick_s, span, 2.0 * math.pi if ways else max(
         farthest_way(network, p.inhibition) for network in networks))
-    legs = _eligible_in_any(networks, p.inhibition) if p.inhibition.auto else ()
+    legs = () if not p.inhibition.auto else _eligible_in_any(
+        networks, p.inhibition, one_of_a_kind=until_lost)
     whole = certify(setting, legs, required_only=required_only, until_lost=until_lost, until=until)
     if (until_lost and not whole.holds) or until not in ('', BEFORE_VOTES):
         return whole
@@ -142,10 +146,19 @@ def votes_among(p: SuiteParameters, networks: Sequence[GaitNetwork], tick_s: flo
     return list(worst.values())
 
 
-def _eligible_in_any(networks: Sequence[GaitNetwork], inhibition: InhibitionParameters
-                     ) -> set[int]:
-    """Legs that are eligible in some network: one that changes at rest keeps what holds it."""
-    legs = set[int]()
+@lru_cache(MOST_KEPT)
+def _fastest(before: Gait, after: Gait, rate: float) -> float:
+    return GaitTransition(before, after).fastest(rate)
+
+
+def _eligible_in_any(networks: Sequence[GaitNetwork], inhibition: InhibitionParameters, *,
+                     one_of_a_kind: bool) -> set[int]:
+    """Legs that are eligible in some network: one that changes at rest keeps what holds it; where
+    one of those that are alike is enough, the one that is eligible in any case.
+    """
+    legs, p = set[int](), networks[0].parameters
+    if one_of_a_kind and len(set(degrees(p.coupling_graph, len(LEGS)))) == 1:
+        return {p.first_leg}
     for network in sorted(networks, key=lambda each: each.gait.omega(0.0, each.scale)):
         if len(legs) < len(LEGS):  # slow ones first, in which more are
             legs.update(eligible_legs(network, inhibition))
