@@ -81,9 +81,9 @@ def settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed:
     for begin in range(0, cells, _BLOCKS * _BLOCK):
         speeds, speed = _slowing(speed, fade, a_b * of.cell)
         within, swinging = list[Array](), list[Array]()
-        for driven in np.stack(drive(speeds), axis=1).reshape(_BLOCKS, -1):
-            block = (carried @ bounds + fed @ driven).reshape(_BLOCK + 1, -1)
-            within.append(block[:-1, -2 * N:])
+        for driven in np.stack(drive(speeds), axis=1).reshape(_BLOCKS, fed.shape[1], -1):
+            block = (carried @ bounds + fed @ driven).reshape(_BLOCK + 1, *bounds.shape)
+            within.append(block[:-1].swapaxes(1, 2).reshape(_BLOCK, -1)[:, -2 * N:])
             bounds = block[-1]
         v, e = np.concatenate(within).reshape(-1, 2, N).swapaxes(0, 1)
         inner = np.maximum(of.inner, rest.radius - e)
@@ -110,12 +110,14 @@ class _Falling(NamedTuple):
     ----------
     cell : float
         Its length [s].
-    start : ndarray (n,)
-        Bounds at first; the last 2N are those of |ẋ_i| and of the distance from rest.
+    start : ndarray (n, m)
+        Bounds at first, of which columns fall alike; column after column, the last 2N are those of
+        |ẋ_i| and of the distance from rest.
     carry : ndarray (n, n)
         Of bounds in a cell.
-    turning, away : ndarray (n,)
-        What r |ω̇| and r times what ω is off that of rest add to them [s].
+    feed : ndarray (n, 2/m)
+        What r |ω̇| and r times what ω is off that of rest add to them, each to its own column
+        where there are two [s].
     inner : ndarray (N,)
         Smallest |x_i| in the set.
     """
@@ -123,8 +125,7 @@ class _Falling(NamedTuple):
     cell: float
     start: Array
     carry: Array
-    turning: Array
-    away: Array
+    feed: Array
     inner: Array
 
 
@@ -142,14 +143,12 @@ def _falling(s: Setting, capture: CaptureSet, turning: float, away: float) -> _F
     system, u = s.network.system, capture.distance
     K = comparison_laplacian(system.graph) + np.diag(capture.gains) - np.diag(
         growth(system.rho, system.radius, capture.smallest_radius))
-    phi, none = phi_functions(-K * STEP, 1), np.zeros_like(K)
-    feed, idle = STEP * phi[1].sum(axis=1), none[0]
+    carry, feed = phi_functions(-K * STEP, 1)
     shape = np.linalg.solve(K, np.ones(len(K)))              # K shape = 1: bounds above it fall
     fastest = _fastest(s, capture.gains, u, s.network.parameters.radius)
-    start = np.concatenate([max(float((fastest / shape).max()), turning) * shape,
-                            max(float((2.0 * u / shape).max()), away) * shape])
-    return _Falling(STEP, start, np.block([[phi[0], none], [none, phi[0]]]),
-                    np.concatenate([feed, idle]), np.concatenate([idle, feed]),
+    start = np.outer(shape, [max(float((fastest / shape).max()), turning),
+                             max(float((2.0 * u / shape).max()), away)])
+    return _Falling(STEP, start, carry, STEP * feed.sum(axis=1, keepdims=True),
                     capture.smallest_radius)
 
 
@@ -167,8 +166,7 @@ def _falling_in_steps(s: Setting, capture: CaptureSet, step: SteppedNetwork) -> 
     count = max(1, round(STEP / step.step_s))
     for _ in range(count):
         carry, feed = each @ carry, each @ feed + kicks
-    return _Falling(count * step.step_s, start, carry, feed[:, 0], feed[:, 1],
-                    np.maximum(r - u, 0.0))
+    return _Falling(count * step.step_s, start[:, None], carry, feed, np.maximum(r - u, 0.0))
 
 
 def _in_a_block(of: _Falling) -> tuple[Array, Array]:
@@ -179,10 +177,10 @@ def _in_a_block(of: _Falling) -> tuple[Array, Array]:
     powers = np.eye(n)
     while len(powers) < _BLOCK * n:
         powers, carry = np.concatenate([powers, powers @ carry]), carry @ carry
-    fed = np.zeros((_BLOCK + 1, n, 2))                           # the last: of cells to come
-    fed[:_BLOCK] = (powers @ np.stack([of.turning, of.away], axis=1)).reshape(_BLOCK, n, 2)
+    fed = np.zeros((_BLOCK + 1, *of.feed.shape))                 # the last: of cells to come
+    fed[:_BLOCK] = (powers @ of.feed).reshape(_BLOCK, *of.feed.shape)
     return np.concatenate([powers, carry]), fed.swapaxes(0, 1)[:, _SINCE].swapaxes(0, 1).reshape(
-        (_BLOCK + 1) * n, 2 * _BLOCK)
+        (_BLOCK + 1) * n, -1)
 
 
 _CELLS = np.arange(_BLOCK + 1)

@@ -26,7 +26,7 @@ from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, SAMPLED
 from dmp_cpg_ros.core.contraction.voting import different_voters, shared_capture
-from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.network import GaitNetwork, at_own_cadence
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -126,7 +126,7 @@ def vote_inequalities(s: Setting) -> list[Inequality]:
     """
     p, inhibition = s.parameters, replace(s.parameters.inhibition, inhibited_legs=LEGS)
     return [] if not p.voting.voting else list(_rows(_Asked(
-        (replace(s.network.parameters, cadence_scale=1.0), inhibition, p.voting, p.reference,
+        (at_own_cadence(s.network.parameters), inhibition, p.voting, p.reference,
          p.leg, s.tick_s, s.span), s)))
 
 

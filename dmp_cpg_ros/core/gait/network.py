@@ -13,7 +13,7 @@ still, nothing is turned and the network has the offsets of the gait.
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import atan2, ceil, cos, pi, sin
 
@@ -91,7 +91,13 @@ def network_system(parameters: CanonicalParameters, phases: Array) -> CanonicalS
     phases : ndarray (4,)
         Locked phases relative to fl [rad].
     """
-    return _network_system(parameters, phases.tobytes())
+    return _network_system(at_own_cadence(parameters), phases.tobytes())
+
+
+@lru_cache(MOST_KEPT)
+def at_own_cadence(parameters: CanonicalParameters) -> CanonicalParameters:
+    """Parameters without a factor on the cadence, which is in nothing but the frequency."""
+    return replace(parameters, cadence_scale=1.0)
 
 
 @lru_cache(MOST_KEPT)

@@ -11,7 +11,6 @@ at which they are held, so that what is certified for a leg holds wherever it is
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import lru_cache
 from math import asin, pi, sqrt
 
@@ -25,7 +24,12 @@ from dmp_cpg_ros.core.contraction.capture import capture_set, place_tolerance, r
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork, network_system
+from dmp_cpg_ros.core.gait.network import (
+    CanonicalParameters,
+    GaitNetwork,
+    at_own_cadence,
+    network_system,
+)
 from dmp_cpg_ros.core.gait.running import CADENCE_RATE
 from dmp_cpg_ros.core.gait.transition import BlendedGait
 from dmp_cpg_ros.core.maths import Array
@@ -71,7 +75,7 @@ def eligible_legs(network: GaitNetwork, inhibition: InhibitionParameters) -> tup
     fastest = max(float(end.cadence.max()) / end.cadence_scale for end in gait.ends)
     omega = (2.0 * pi * sqrt(GRAVITY / network.scale.leg_length) * (1.0 + share) * fastest
              * max(gait.cadence_scale, p.cadence_scale))
-    return _holding(replace(p, cadence_scale=1.0), inhibition.inhibition_gain,
+    return _holding(at_own_cadence(p), inhibition.inhibition_gain,
                     inhibition.region_radius, omega)
 
 

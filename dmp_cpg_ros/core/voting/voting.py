@@ -22,7 +22,12 @@ from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
-from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork, network_system
+from dmp_cpg_ros.core.gait.network import (
+    CanonicalParameters,
+    GaitNetwork,
+    at_own_cadence,
+    network_system,
+)
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
@@ -90,7 +95,7 @@ def vote_clamp(network: GaitNetwork, inhibition: InhibitionParameters, voting: V
         The computed clamp is the geometric mean of the window; without a window a little over what
         is certified for the majority, and the whole k_inh where nothing is.
     """
-    window = _window(replace(network.parameters, cadence_scale=1.0), span.omega_armed[1],
+    window = _window(at_own_cadence(network.parameters), span.omega_armed[1],
                      inhibition.region_radius, voting.majority, span.omega[0])
     k_inh = inhibition.inhibition_gain
     if voting.vote_limit > 0.0 or k_inh == 0.0:
