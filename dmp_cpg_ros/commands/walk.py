@@ -92,6 +92,7 @@ def _main(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> int:
 
 def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _Plan:
     """Read everything; raises DmpCpgError for what cannot be run."""
+    _take_robot(options)
     # In lock-step nobody may command, and an hour would pass without anything to see.
     stands_by = options.view and options.scenario is None and not options.lock_step
     default = 'stand_by' if stands_by else 'start_stop'
@@ -121,6 +122,20 @@ def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _P
 
         film.checked_film_path(Path(options.video))
     return _Plan(scenario, suite, certificate, overrides, options, ros)
+
+
+def _take_robot(options: argparse.Namespace) -> None:
+    """Take a robot of the package that stands in the place of a scenario for what it is."""
+    if options.robot is None and options.scenario in robots():
+        try:
+            find_config(options.scenario, SCENARIOS)
+        except MissingFileError:
+            options.robot, options.scenario = options.scenario, None
+
+
+def robots() -> set[str]:
+    """Names of the robots in the package's config folders."""
+    return {path.stem for folder in config_folders() for path in (folder / ROBOTS).glob('*.yaml')}
 
 
 def _overrides(scenario: Scenario, options: argparse.Namespace, ros: ros_arguments.RosArguments
@@ -199,9 +214,7 @@ def load_scenario(name: str | Path) -> Scenario:
     try:
         path = find_config(name, SCENARIOS)
     except MissingFileError as error:
-        robots = {path.stem for folder in config_folders()
-                  for path in (folder / 'robots').glob('*.yaml')}
-        hint = f'{name} is a robot: walk --robot {name}; ' if str(name) in robots else ''
+        hint = f'{name} is a robot: walk --robot {name}; ' if str(name) in robots() else ''
         raise MissingFileError(f'{hint}{error}') from error
     return Scenario.from_mapping(load_yaml(path), f"'{path}'")
 
@@ -297,7 +310,8 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add('scenario', nargs='?',
         help='scenario file, by its path or in config/scenarios (default: start_stop, and with '
-        '--view, but for --lock-step, an hour for your commands)')
+        '--view, but for --lock-step, an hour for your commands); a robot of config/robots, such '
+        'as go2, stands for --robot')
     add('--lock-step', action='store_true',
         help='wait for every target, so that the run does not depend on the speed of the machine')
     sharing = parser.add_mutually_exclusive_group()

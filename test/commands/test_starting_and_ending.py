@@ -10,6 +10,7 @@ import os
 import pty
 import re
 import select
+import shutil
 import signal
 import subprocess
 import sys
@@ -27,6 +28,7 @@ import ros_processes
 from ros_processes import RUN_S, SHARED_HZ, NodeProcess, Processes, Ros, wait_until
 from std_srvs.srv import Trigger
 
+from dmp_cpg_ros import configuration
 from dmp_cpg_ros.analysis.bag import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands import analyze
@@ -34,7 +36,8 @@ from dmp_cpg_ros.commands import walk as walk_command
 from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import RosArguments
 from dmp_cpg_ros.commands.suite_domain import alone_in_domain
-from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.configuration import config_folders, find_config
+from dmp_cpg_ros.core.errors import MissingFileError
 from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError, claim
 from dmp_cpg_ros.suite_table import WALKING_NODES
 
@@ -419,6 +422,31 @@ def test_what_is_played_without_a_scenario(words: str, played: str, seconds: flo
     scenario = walk_command._planned(options, RosArguments()).scenario
     assert scenario.name == played
     assert scenario.duration_s == (seconds or walk_command.load_scenario(played).duration_s)
+
+
+@pytest.mark.parametrize(('words', 'played'), [
+    ('mini_quadruped', 'start_stop'), ('mini_quadruped --view', 'stand_by'),
+    ('amble_60', 'amble_60')])
+def test_a_robot_in_the_place_of_a_scenario_is_the_one_that_walks(
+        words: str, played: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    folder = tmp_path / 'robots'
+    folder.mkdir()
+    for name in ('mini_quadruped', 'amble_60'):  # a scenario of the same name is the scenario
+        shutil.copy(find_config('robots/mini_quadruped'), folder / f'{name}.yaml')
+    folders = [tmp_path, *config_folders()]
+    for module in (configuration, walk_command):
+        monkeypatch.setattr(module, 'config_folders', lambda: folders)
+    plan = walk_command._planned(
+        walk_command._parser().parse_args(words.split()), RosArguments())
+    assert plan.scenario.name == played
+    given = plan.overrides.get('robot')
+    assert given == (None if played == words else str(folder / 'mini_quadruped.yaml'))
+
+
+def test_two_robots_cannot_walk_at_once() -> None:
+    options = walk_command._parser().parse_args(['mini_quadruped', '--robot', 'go2'])
+    with pytest.raises(MissingFileError, match='mini_quadruped is a robot: walk --robot'):
+        walk_command._planned(options, RosArguments())
 
 
 def test_a_report_says_how_far_it_is_and_a_full_disk_ends_it_in_a_line_before_what_is_said_last(
