@@ -411,6 +411,31 @@ def test_in_a_browser_the_robot_is_driven_pushed_and_stopped(
     assert frame['requested'] and frame['stop']['automatic'] == 'false'
 
 
+def press(page: Page, button: str) -> None:
+    """Click a button until what it asks for is taken, by a robot that may look after itself."""
+    start(page, lambda: page.click(button))
+
+
+def test_in_a_browser_the_body_lies_down_and_stands_up_and_the_gait_is_chosen(
+        client: Client, page: Page) -> None:
+    at_rest(client)
+    page.open(client.address, 900, 640)
+    page.until(state('at rest'))
+    mode = "document.querySelector('#mode').textContent"
+    page.until(f"{mode} === 'standing'")
+    gait = "[...document.querySelectorAll('#gaits .chosen')].map((e) => e.textContent).join()"
+    for name in ('trot', 'amble'):
+        press(page, f'#gaits [data-gait="{name}"]')
+        page.until(f"{gait} === '{name}'")
+    for name, becomes in (('lie_down', 'lying'), ('stand_up', 'standing')):
+        press(page, f'[data-request="{name}"]')
+        page.until(f"{mode} === '{becomes}'")
+    page.evaluate("document.querySelector('#answers').replaceChildren()")
+    page.click('[data-request="recover"]')
+    page.until("document.querySelector('#answers').textContent.includes('refused')")
+    assert not page.problems
+
+
 @pytest.mark.parametrize('released', ['W', 'Meta'])
 def test_a_key_that_is_released_with_shift_or_meta_drives_no_more(
         client: Client, page: Page, released: str) -> None:
