@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.inhibition import AUTO
 from dmp_cpg_ros.core.errors import DmpCpgError
@@ -33,7 +34,7 @@ from dmp_cpg_ros.studies.adversary_draws import random_events, setting, varied
 from dmp_cpg_ros.studies.adversary_suite import play, smaller
 from dmp_cpg_ros.studies.draws import Case, smallest
 from dmp_cpg_ros.studies.oscillator_loop import CONDITIONS, Oscillators
-from dmp_cpg_ros.studies.workers import Workers
+from dmp_cpg_ros.studies.workers import SPARSE_S, Workers
 from dmp_cpg_ros.suite import load_suite
 
 WEAKENED = tuple(dict.fromkeys((*adversary_networks.WEAKENED, *CONDITIONS, *adversary_rows.ROWS)))
@@ -79,7 +80,7 @@ def search(seed: int, seconds: float, weaken: str = '', most: int = 3, only: str
     description, sizes = load_description(load_suite().robot_file), np.arange(2, 13)
     guided: list[tuple[float, Case]] = []
     close: list[tuple[float, Case]] = []
-    counts, failures = Counter[str](), list[Case]()
+    counts, failures, sparse = Counter[str](), list[Case](), Progress(f'search {seed}: ', SPARSE_S)
     while time.monotonic() < end and len(failures) < most:
         if weaken in ('', *adversary_networks.WEAKENED) and not only:
             size = int(rng.choice(sizes, p=1.0 / sizes / np.sum(1.0 / sizes)))
@@ -107,9 +108,12 @@ def search(seed: int, seconds: float, weaken: str = '', most: int = 3, only: str
             guided = sorted([*guided, (closest, case)], key=lambda one: -one[0])[:16]
             if what:
                 failures.append(_smallest_suite(description, case, what, weaken))
+        told = (f"{counts['networks']} networks, {counts['suites']} suites, {len(failures)} "
+                'failures')
         if sys.stderr.isatty():
-            print(f"{counts['networks']} networks, {counts['suites']} suites, {len(failures)} "
-                  'failures', end='\r', file=sys.stderr)
+            print(told, end='\r', file=sys.stderr)
+        else:
+            sparse(told)
     return counts, failures
 
 

@@ -73,18 +73,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
                         default=[10, 100, 1000, 3000, 10_000],
                         help='numbers of oscillators (default: 10 100 1000 3000 10000)')
     options = parser.parse_args(arguments)
-    tables = {
-        'One time step of four coupled oscillators (ratio: to the first row)': steps_of_four(),
-        'A time step per oscillator (ratio: to 1,000 oscillators)': steps_of_many(options.sizes),
-        'The parts of one tick of the plain loop (ratio: to the whole tick)': parts_of_a_tick(),
-        'Certificates (ratio: to a whole tick of the plain loop)': certificates(),
-        'Messages of every tick (ratio: to the first row)': messages(),
+    measurements: dict[str, Callable[[], list[Row]]] = {
+        'One time step of four coupled oscillators (ratio: to the first row)': steps_of_four,
+        'A time step per oscillator (ratio: to 1,000 oscillators)':
+            lambda: steps_of_many(options.sizes),
+        'The parts of one tick of the plain loop (ratio: to the whole tick)': parts_of_a_tick,
+        'Certificates (ratio: to a whole tick of the plain loop)': certificates,
+        'Messages of every tick (ratio: to the first row)': messages,
     }
-    for title, rows in tables.items():
+    tables = dict[str, list[Row]]()
+    for title, measure in measurements.items():
+        rows = tables[title] = measure()
         width = max(len(row.what) for row in rows)
         print(f'\n{title}')
         for row in rows:
-            print(f'  {row.what.ljust(width)} {_text(row.seconds)} {row.ratio:8.2f}')
+            print(f'  {row.what.ljust(width)} {_text(row.seconds)} {row.ratio:8.2f}', flush=True)
     write_results(options.json, {title: [row._asdict() for row in rows]
                                  for title, rows in tables.items()})
     return 0

@@ -23,6 +23,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from statistics import median
 
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.nodes.framework.execution import make_executor
 from dmp_cpg_ros.nodes.framework.middleware import RANGE, VARIABLES, prepare_middleware
@@ -101,6 +102,7 @@ def measure(way: str, readers: int, domain: int, rng: random.Random
     writer = context.Process(target=_write, args=(way, domain, theirs))
     writer.start()
     living, begun, heard = dict[SpawnProcess, tuple[float, Connection]](), 0, list[float]()
+    tell = Progress(f'{way}: ')
     while living or begun < readers:
         while len(living) < READERS and begun < readers:
             begun += 1
@@ -114,6 +116,7 @@ def measure(way: str, readers: int, domain: int, rng: random.Random
             reader.join()
             _, mine = living.pop(reader)
             heard.append(mine.recv() if mine.poll() else inf)
+            tell(f'{len(heard)}/{readers} readers')
         time.sleep(rng.uniform(0.001, 0.02))
     ours.send(None)
     count, waits = ours.recv()

@@ -96,6 +96,7 @@ def download(folder: Path, patience_s: float = PATIENCE_S) -> dict[str, Path]:
         archives[part] = folder / f'{name.strip("@").replace("/", "-")}-{version}.tgz'
         if not archives[part].is_file():
             command = ['npm', 'pack', '--silent', '--prefer-offline', f'{name}@{version}']
+            print(f'fetching {name}@{version} from npm', file=sys.stderr)
             try:
                 subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True,
                                timeout=patience_s)

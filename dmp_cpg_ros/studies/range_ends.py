@@ -26,6 +26,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import run_command
 from dmp_cpg_ros.nodes.framework.execution import make_executor
 from dmp_cpg_ros.nodes.framework.middleware import prepare_middleware
@@ -147,10 +148,11 @@ def _study(options: argparse.Namespace, _: Any) -> int:
     prepare_middleware()
     context = Context()
     rclpy.init(context=context, args=[])
-    client = Client(context)
+    client, tell, asked_for = Client(context), Progress(), list(questions(options.nodes))
     with TemporaryDirectory() as scratch:
         walk: WalkProcess | None = None
-        for number, asked in enumerate(questions(options.nodes)):
+        for number, asked in enumerate(asked_for):
+            tell(f'{number}/{len(asked_for)}: {asked.node} {asked.name}')
             if walk is None:
                 walk = WalkProcess.of(Path(scratch) / str(number), LASTS_S, ahead(0.3),
                                       '--lock-step', '--composed', '--rate', RATE_HZ)

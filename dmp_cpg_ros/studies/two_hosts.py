@@ -30,6 +30,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from dmp_cpg_ros.commands.fork_server import ForkServer
 from dmp_cpg_ros.commands.processes import ProcessGroup
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, positive, run_command
 from dmp_cpg_ros.commands.suite_run import ENDED_WITHIN_S
 from dmp_cpg_ros.configuration import find_config
@@ -139,11 +140,16 @@ def walk(two: TwoHosts, setting: Setting, links: Sequence[Conditions], folder: P
     list of (float, str)
         When the suite said what [s].
     """
+    tell = Progress()
     with _suite(two, setting, folder, peers) as alive:
+        def turned() -> None:
+            alive()
+            tell(f'{max(0.0, watch.seconds):.0f} s of the robot, drive {watch.drive or "unknown"}')
+
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         try:
             node = Node('link_watch', enable_rosout=False, start_parameter_services=False)
-            watch, phases = LinkWatch(node, make_executor('events'), alive), []
+            watch, phases = LinkWatch(node, make_executor('events'), turned), []
             watch.begin()
             watch.run(0.5)
             watch.command(setting.speed)

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.verdict import Change
 from dmp_cpg_ros.core.errors import DmpCpgError
@@ -64,9 +65,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--seed', type=int, default=0, help='of the draws (default: 0)')
     options = parser.parse_args(arguments)
     rng = np.random.default_rng(options.seed)
-    judged: list[Judged] = []
+    judged, tell = list[Judged](), Progress()
     while len(judged) < options.changes:
         judged += _judged(rng)
+        tell(f'{len(judged)}/{options.changes}')
     print(markdown_table(
         ('changes', 'number', 'median [ms]', '99 % [ms]', 'longest [ms]', 'within 50 ms'),
         [_row(name, [each for each in judged if each.accepted == accepted])

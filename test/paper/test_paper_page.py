@@ -132,10 +132,12 @@ def test_a_wheel_is_what_a_package_of_conda_installs_without_its_tests() -> None
     assert wheel == paper_page.wheel(dict(reversed(conda.items())))
 
 
-def test_without_npm_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_npm_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setenv('PATH', str(tmp_path))
     with pytest.raises(DataError, match='npm pack .*pyodide@'):
         paper_page.download(tmp_path)
+    assert capsys.readouterr().err.startswith('fetching pyodide@')
 
 
 # --- in a browser -------------------------------------------------------------------------------

@@ -5,12 +5,14 @@
 from __future__ import annotations
 
 import itertools
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from core_examples import quadruped
 
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.studies import adversary, adversary_networks, adversary_rows
 from dmp_cpg_ros.studies.adversary import FOLLOWING, WEAKENED, main, search
 from dmp_cpg_ros.studies.adversary_suite import play, smaller
@@ -165,8 +167,10 @@ def test_the_command_counts_what_it_tried(capsys: pytest.CaptureFixture[str],
     monkeypatch.setattr(adversary, 'SHRINK_S', 1.0)
     monkeypatch.setattr(adversary_networks, 'attack',        # 25 networks at once are enough
                         lambda rng, size, count, *more: attack(rng, size, count // 10, *more))
+    monkeypatch.setattr(Progress, 'SILENT_S', 0.0)
     assert main(['--seconds', '60', '--weaken', 'capture', '--failures', '1']) == 1
-    told = capsys.readouterr().out
+    told, aside = capsys.readouterr()
+    assert re.match(r'search 0: \d+ networks, \d+ suites, \d failures\n', aside), aside
     assert told.startswith('| 0 | 1 x 60 s | capture |') and 'happened: leaves C' in told
 
 

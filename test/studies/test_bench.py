@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 from functools import partial
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -29,6 +30,18 @@ def test_it_prints_and_writes_its_tables(
         for row in rows:
             assert row['what'] in printed and row['seconds'] > 0.0 and row['ratio'] > 0.0
     assert [row['what'] for row in list(tables.values())[1]][:2] == ['ring, 10', 'ring, 20']
+
+
+def test_a_table_is_told_before_the_next_is_measured(
+        capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(_: object) -> NoReturn:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(bench, 'seconds_of', partial(seconds_of, repetitions=1, least=1e-6))
+    monkeypatch.setattr(bench, 'steps_of_many', interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        main([])
+    assert 'exponential step' in capsys.readouterr().out
 
 
 def test_a_time_is_that_of_one_call() -> None:
