@@ -144,6 +144,16 @@ def shell_lines(document: Path) -> list[str]:
             *(command for command, _ in transcript(document))]
 
 
+def sourced_lines(document: Path) -> list[str]:
+    """What it types where ROS is sourced, or other tools are; not run as it stands."""
+    return [line for block in blocks(document, 'bash') for line in block.splitlines()
+            if not line.startswith('#')]
+
+
+OF_RCL = {'--params-file', '--enclave'}
+"""Options behind ``--ros-args`` that every node has from ROS, whatever its help shows."""
+
+
 def commands(line: str) -> list[list[str]]:
     """Words of each command of a line."""
     words = shlex.split(line.rstrip(' &'), comments=True)
@@ -181,10 +191,10 @@ def test_options_and_parameters_of_commands_exist(document: Path) -> None:
     assert isinstance(executables, tuple)
     every_parameter = {name for table in tables_of_parameters().values() for name in table.fields}
     inline = re.findall(rf"`((?:{'|'.join(executables)}) [^`]+)`", text(document))
-    for line in [*shell_lines(document), *inline]:
+    for line in [*shell_lines(document), *sourced_lines(document), *inline]:
         for command in commands(line):
-            words = command[command[0] == PACKAGE:]
-            if words[0] not in executables:
+            words = command[command.index(PACKAGE) + 1 if PACKAGE in command else 0:]
+            if not words or words[0] not in executables:
                 continue
             shown = help_of(words[0])
             if words[0] == 'robot_client':
@@ -192,7 +202,8 @@ def test_options_and_parameters_of_commands_exist(document: Path) -> None:
             for option in words[1:]:
                 name, _, assigned = option.partition(':=')
                 if re.fullmatch(r'--[a-z-]+', option):
-                    assert option in shown, line
+                    assert option in shown or (
+                        option in OF_RCL and '--ros-args' in words), line
                 elif assigned:
                     assert name in every_parameter, line
 
@@ -202,6 +213,9 @@ def studies(document: Path) -> Iterator[list[str]]:
     module = rf'{PACKAGE}\.studies\.'
     for command in re.findall(rf'`(python -m {module}[^`]*)`', text(document)):
         yield shlex.split(command)[2:]
+    for line in sourced_lines(document):
+        if re.match(rf'python3? -m {PACKAGE}\.', line):
+            yield shlex.split(line, comments=True)[2:]
     for target, variable, words in re.findall(
             r"`make ([a-z-]+) ([A-Z_]+)='([^']*)'`", text(document)):
         line = given(target, variable).partition('GIVEN')[0].split()
@@ -240,12 +254,15 @@ def test_options_of_studies_exist(document: Path) -> None:
 def test_names_in_commands_of_ros2_exist(document: Path) -> None:
     """They are not run: ``test_ros2_commands.py`` has those that speak with a suite."""
     pytest.importorskip('rclpy')
+    from dmp_cpg_ros.suite_table import WALKING_NODES
+
     executables = setup_constant('EXECUTABLES')
     assert isinstance(executables, tuple)
     tables = tables_of_parameters()
     launch = (ROOT / 'launch' / 'suite.launch.py').read_text(encoding='utf-8')
-    lines = [line for block in blocks(document, 'bash') for line in block.splitlines()]
-    for line in [*lines, *re.findall(r'`(ros2 [^`]+)`', text(document))]:
+    for line in [*sourced_lines(document), *re.findall(r'`(ros2 [^`]+)`', text(document))]:
+        for file in re.findall(r'(?<= DIR/)\S+', line):
+            assert (ROOT / file).is_file(), line
         match [word for word in shlex.split(line, comments=True)
                if not re.fullmatch(r'--once|-r|\d+', word)]:
             case ['ros2', 'run', package, name, *arguments] if package == PACKAGE:
@@ -253,6 +270,9 @@ def test_names_in_commands_of_ros2_exist(document: Path) -> None:
                 given = [word.partition(':=')[0] for flag, word in pairwise(arguments)
                          if flag == '-p']
                 assert set(given) <= set(tables[name].fields if name in tables else given), line
+                if name == 'composed_suite':
+                    named = arguments[:arguments.index('--ros-args')]
+                    assert named and set(named) <= set(WALKING_NODES), line
             case ['ros2', 'launch', package, file, *arguments] if package == PACKAGE:
                 assert (ROOT / 'launch' / file).is_file(), line
                 for argument in arguments:
