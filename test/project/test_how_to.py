@@ -11,7 +11,7 @@ from checkout import ROOT
 
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.strict_yaml import parse_yaml
-from dmp_cpg_ros.suite_table import KINDS
+from dmp_cpg_ros.suite_table import KINDS, namespace_rules
 
 CONTROLLERS = {
     'joint_state_broadcaster/JointStateBroadcaster': {
@@ -69,6 +69,18 @@ def test_the_nodes_that_expect_one_another_beside_a_driver_are_those_that_are_st
     assert [name for kind in expected for name in KINDS[kind].instances] == started.split()
     assert given.keys() <= {
         name for table in tables_of_parameters().values() for name in table.fields}
+
+
+def test_the_rules_for_nodes_in_a_namespace_are_those_of_a_suite() -> None:
+    pytest.importorskip('rclpy')
+    from dmp_cpg_ros.nodes.messages.interfaces import SERVICES, TOPICS
+
+    text = (ROOT / 'doc' / 'how_to' / 'several_robots.md').read_text(encoding='utf-8')
+    (rules,) = re.findall(r'`--ros-args (-r __ns:=[^`]+)`', text)
+    told = [tuple(rule.split(':=')) for rule in rules.removeprefix('-r ').split(' -r ')]
+    assert told == namespace_rules('/robot1')
+    absolute = {topic.name for topic in (*TOPICS, *SERVICES) if topic.name.startswith('/')}
+    assert absolute == {name for name, _ in told[1:]}  # those that ROS has; no others
 
 
 @pytest.mark.parametrize(('gait', 'column'), [('amble', 3), ('walk', 4), ('trot', 5)])
