@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from checkout import ROOT, modules, setup_constant
+from checkout import ROOT, modules, setup_argument, setup_constant
 from headlines import (
     BENCHMARK,
     README,
@@ -27,6 +27,7 @@ from headlines import (
 from headlines_of_commands import DEFAULTS, OPTIONS, options_of
 
 from dmp_cpg_ros.configuration import SCENARIOS, find_config
+from dmp_cpg_ros.robot.model_loader import LONGEST_PHYSICS_STEP
 from dmp_cpg_ros.strict_yaml import load_yaml
 
 ROWS = table_of_studies()
@@ -189,6 +190,16 @@ def test_the_other_numbers_of_the_readme_are_those_of_the_scenarios() -> None:
     assert {(True, float(begin)), (False, float(end))} <= set(requests)
     assert 'five minutes for your commands' in text
     assert load_yaml(find_config('scenarios/stand_by.yaml'))['duration'] == 5 * 60.0
+
+
+def test_the_rate_of_the_drive_and_the_pythons_of_the_readme_are_those_of_the_code() -> None:
+    text = README.read_text(encoding='utf-8')
+    (rate,) = re.findall(r'joint drive at ([\d.]+) kHz', text)
+    assert float(rate) * 1e3 == 1.0 / LONGEST_PHYSICS_STEP
+    (least, most), = re.findall(r'with Python 3\.(\d+)-3\.(\d+),', text)
+    makefile = (ROOT / 'Makefile').read_text(encoding='utf-8')
+    assert f'(3, {least}) <= sys.version_info < (3, {int(most) + 1})' in makefile
+    assert setup_argument('python_requires') == f'>=3.{least}'
 
 
 def test_a_number_that_nobody_has_measured_is_noticed() -> None:
