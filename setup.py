@@ -50,12 +50,13 @@ def version() -> str:
 
 
 def maintainer() -> dict[str, object]:
-    """Who maintains the package and where it lives, from package.xml."""
+    """Who wrote and maintains the package and where it lives, from package.xml."""
     manifest = ElementTree.parse('package.xml').getroot()
     person = manifest.find('maintainer')
     if person is None:
         raise RuntimeError('package.xml names no maintainer')
-    return {'maintainer': person.text, 'maintainer_email': person.get('email'),
+    return {'author': manifest.findtext('author'),
+            'maintainer': person.text, 'maintainer_email': person.get('email'),
             'project_urls': {url.get('type'): url.text for url in manifest.findall('url')}}
 
 
@@ -96,7 +97,6 @@ setup(
     name=NAME,
     version=version(),
     description='CPG-based quadruped walking with coupled rhythmic movement primitives',
-    author='The dmp_cpg_ros authors',
     license='Apache-2.0',
     **maintainer(),
     python_requires='>=3.10',

@@ -401,6 +401,10 @@ def test_a_wheel_has_the_same_files_from_the_checkout_as_from_an_sdist(
         with ZipFile(built(folder, 'wheel')) as wheel:
             contents.append({entry.filename: entry.CRC for entry in wheel.infolist()
                              if not entry.filename.endswith('/RECORD')})
+            (about,) = (name for name in wheel.namelist() if name.endswith('/METADATA'))
+            said = wheel.read(about).decode('utf-8').splitlines()
+            assert {f'Author: {texts("author")[0]}', f'Maintainer: {texts("maintainer")[0]}',
+                    f'Version: {texts("version")[0]}'} <= set(said)
     assert contents[0] == contents[1]
     assert list(scratch.iterdir()) == []
     names = {name.partition('.data/data/')[2] or name for name in contents[0]}
