@@ -48,6 +48,28 @@ speeds.draw({ speed: [0.8, 0, 0], reference: [0.5, 0, 0] });
 console.log(JSON.stringify(texts));
 """
 
+DRAWN = """
+globalThis.window = {};
+const { Oscillators, drawTimes } = await import('%s');
+const frames = %s.map((frame) => {
+  const done = { texts: [], discs: [], bars: [] };
+  const own = { fillText: (text) => done.texts.push(text),
+    arc: (x, y, radius) => done.discs.push([x, y, radius]),
+    fillRect: (x, y, width) => done.bars.push([ink.fillStyle, width]) };
+  const ink = new Proxy(own, { get: (of, name) => (name in of ? of[name] : () => {}),
+    set: (of, name, value) => { of[name] = value; return true; } });
+  const canvas = { clientWidth: 300, clientHeight: 226, getContext: () => ink };
+  if (frame.x) new Oscillators(canvas).draw(frame, { legs: ['fl', 'fr', 'rl', 'rr'],
+    inhibited: ['fl'] });
+  else drawTimes(canvas, frame);
+  return done;
+});
+console.log(JSON.stringify(frames));
+"""
+
+LATE = '#e5484d'
+"""Colour of a time that is longer than its bound."""
+
 BUTTON, SLIDER, BOX, BODY = (
     {'tagName': tag, 'type': kind} for tag, kind in (
         ('BUTTON', 'submit'), ('INPUT', 'range'), ('INPUT', 'checkbox'), ('BODY', None)))
@@ -104,3 +126,37 @@ def test_panels_name_their_axes_and_their_scale() -> None:
     texts = run(WRITTEN % source('panels.js'))
     assert texts.count('x₁') == texts.count('x₂') == 4
     assert {'0.8 m/s', '0', '8 s'} <= set(texts)
+
+
+def drawn(*frames: dict[str, Any]) -> list[dict[str, Any]]:
+    """Texts, discs and bars of each frame."""
+    return list(run(DRAWN % (source('panels.js'), json.dumps(frames))))
+
+
+def test_the_last_stop_is_told_with_its_prediction_its_bound_and_what_it_took() -> None:
+    stop = {'state': 'at_rest', 'predicted_s': '1.252', 'bound_s': '2.337', 'measured_s': '1.26',
+            'request_stamp': '3.0'}
+    frame = {'time': 4.5, 'requested': True, 'stop': stop}
+    none, ended, lasts, late, start = (
+        found for found in drawn(
+            {'time': 1.0, 'stop': {}}, frame,
+            {**frame, 'stop': {**stop, 'state': 'captured', 'measured_s': 'nan'}},
+            {**frame, 'stop': {**stop, 'measured_s': '2.4'}}, {**frame, 'requested': False}))
+    assert none['texts'] == ['no stop requested yet']
+    told = {'predicted', '1.252 s', 'measured', '1.260 s', 'bound 2.337 s', 'to rest'}
+    assert set(ended['texts']) == told
+    assert {'elapsed', '1.500 s'} <= set(lasts['texts']) and 'measured' not in lasts['texts']
+    assert LATE in [colour for colour, _ in late['bars']]
+    assert LATE not in [colour for colour, _ in ended['bars']]
+    assert set(start['texts']) == told - {'to rest'} | {'to walking'}
+    (_, _), (_, predicted), (_, _), (_, measured) = ended['bars']
+    assert measured / predicted == pytest.approx(1.26 / 1.252)
+
+
+def test_an_oscillator_is_drawn_on_its_circle_and_the_region_about_its_place() -> None:
+    x, places = [[0.6, 0.8], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]], [[1.0, 0.0]] * 4
+    (found,) = drawn({'x': x, 'places': places, 'region': 0.3, 'gains': [400.0, 0.0, 0.0, 0.0]})
+    (x0, y0, circle), region, state = found['discs'][:3]
+    assert region == pytest.approx([x0 + circle, y0, 0.3 * circle])
+    assert state[:2] == pytest.approx([x0 + 0.6 * circle, y0 - 0.8 * circle])
+    assert len(found['discs']) == 9  # a region of the inhibited one alone
