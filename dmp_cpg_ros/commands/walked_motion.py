@@ -16,6 +16,7 @@ from dmp_cpg_ros.analysis.context import find_parameter
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.strict_json import read_json
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.run_folder import run_context, run_of
 from dmp_cpg_ros.core.canonical.phase import phase, phase_rate
 from dmp_cpg_ros.core.errors import DataError
@@ -72,7 +73,7 @@ def read_motion(path: Path, topic: str = 'joint_targets', robot_file: Path | Non
     told = {} if run is None else read_json(run / 'manifest.json')
     parameters = told.get('parameters') or {}
     context, _ = run_context(parameters, robot_file)
-    recording = load_recording(path, joint_names=context.joint_names)
+    recording = load_recording(path, joint_names=context.joint_names, tell=Progress(f'{path}: '))
     joints = recording.targets if topic == 'joint_targets' else recording.joints
     canonical = recording.canonical
     walked = next((gait.before for gait in canonical.gaits if not gait.after), 'amble')

@@ -18,6 +18,7 @@ from synthetic_walk import SyntheticWalk
 from dmp_cpg_ros.commands import learn, walked_motion
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration
 from dmp_cpg_ros.commands.learn import main
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
 from dmp_cpg_ros.commands.run_folder import run_context
 from dmp_cpg_ros.core.errors import DataError
@@ -358,7 +359,7 @@ def test_a_motion_needs_the_recording_of_a_walk(tmp_path, capsys):
     assert not out.exists()
 
 
-def test_a_motion_is_learned_where_messages_of_legs_are_lost(tmp_path, capsys):
+def test_a_motion_is_learned_where_messages_of_legs_are_lost(tmp_path, capsys, monkeypatch):
     """As at the end of every recording in real time, which comes within a tick."""
     context, _ = run_context({'gait': 'amble'}, None)
     scale = body_scale(context.robot)
@@ -373,6 +374,10 @@ def test_a_motion_is_learned_where_messages_of_legs_are_lost(tmp_path, capsys):
     counts = [[len(foot.foot) for (foot,) in walked_motion.read_motion(
         write_recording(of, tmp_path / name))[0]] for name, of in (('all', walk), ('lost', lost))]
     assert counts[1] == [count - 2 for count in counts[0]]
+    monkeypatch.setattr(Progress, 'SILENT_S', 0.0)
+    walked_motion.read_motion(tmp_path / 'all')  # one that is longer takes its time, and says so
+    assert capsys.readouterr().err.startswith(f'{tmp_path / "all"}: reading: ')
+    monkeypatch.undo()
     bag = write_recording(none, tmp_path / 'none')
     assert main([str(bag), '--motion', str(tmp_path / 'motion.yaml')]) == BAD_INPUT
     assert 'lacks the joints fl_abduction, fl_hip, fl_knee' in capsys.readouterr().err
