@@ -15,7 +15,9 @@ is doubted. Where all legs do at once it is what carries the readings
 that fails, and nothing of it is believed. What comes late does so too, but only the legs that move
 fast jump by enough as it begins: who tells to the last bit what it has told before, while another
 one jumps, jumps back as well. To believe those that stand, of a tenth of a second ago, and not
-those that swing, swung heavy robots up until they tipped over.
+those that swing, swung heavy robots up until they tipped over. What is late goes on without
+another jump and about the same angles: a leg that is late
+(:mod:`~dmp_cpg_ros.core.estimation.lateness`) is not believed until it has caught up by a jump.
 
 What lasts is no proof: an offset that comes in one tick is told as steadily as the truth. A leg is
 believed again once for a while it has not jumped and either its jumps have cancelled each other,
@@ -32,14 +34,12 @@ from math import nan
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dmp_cpg_ros.core.estimation.lateness import FROZEN_NS, MOVING, PAST_NS, told_late, unknown
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import made_often, replace_unchecked
 from dmp_cpg_ros.core.maths.vec3 import minus, triple
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.robot_model.state import LEGS
-
-FROZEN_NS = 50_000_000
-"""Time over which readings repeat before they count as frozen [ns]."""
 
 JUMP, STEADY_NS = 8.0, 100_000_000
 """Change of a turn rate in a tick that is none [rad/s], and for how long a sensor must not have
@@ -54,21 +54,19 @@ least [ns]. Accelerations have made 0.007 rad in 4 ms in a walk and 0.018 rad in
 1200 rad/s².
 """
 
+CAUGHT_UP, CAUGHT_UP_PULL = 0.02, 1200.0
+"""The same of a leg that is late [rad], [rad/s²]: it catches up by what it moves in that time.
+"""
+
 MANY, CALM_NS = 3, 2_000_000_000
 """Ticks with jumps from which an encoder tells anything, and for how long it must not have jumped
 to be believed then [ns].
 """
 
-PAST_NS = 250_000_000
-"""How long what was told is known again [ns]."""
-
 ALIKE, USUAL_S = 0.075, 1.0
 """Distance of two mean angles within which they are the same [rad], and the time over which they
 are taken [s].
 """
-
-MOVING = 0.5
-"""Velocity of a joint from which the robot moves [rad/s]."""
 
 N = len(LEGS)
 
@@ -89,6 +87,8 @@ class Doubt:
         Stamps at which they told last what does not fit [ns].
     slipped, told : ndarray (12,)
         Sum of their jumps, and their mean angles since the last one [rad].
+    late_ns : ndarray (4,)
+        By how much they are late [ns].
     """
 
     legs: tuple[bool, ...]
@@ -98,10 +98,11 @@ class Doubt:
     odd_ns: Array
     slipped: Array
     told: Array
+    late_ns: Array
 
 
 NOBODY = Doubt((False,) * N, False, np.zeros(N), np.zeros(N, int), np.zeros(N, int),
-               np.zeros(3 * N), np.zeros(3 * N))
+               np.zeros(3 * N), np.zeros(3 * N), np.zeros(N, int))
 """No leg is in doubt."""
 
 
@@ -181,6 +182,7 @@ def _heard(watch: SensorWatch, readings: SensorReadings
            ) -> tuple[tuple[int, ...], dict[int, float]]:
     """Stamps at which each joint was heard last, and by how much joints jumped [rad]."""
     last, now, heard, jumps = watch.readings, readings.joints_ns, [], {}
+    late = watch.doubt.late_ns.tolist()
     for i, (q, before, rate, rate_before, heard_ns) in enumerate(zip(
             readings.joint_position.tolist(), last.joint_position.tolist(),
             readings.joint_velocity.tolist(), last.joint_velocity.tolist(), watch.heard_ns,
@@ -191,7 +193,8 @@ def _heard(watch: SensorWatch, readings: SensorReadings
             continue
         heard.append(now)
         dt = 1e-9 * (now - heard_ns)
-        apart, most = change - 0.5 * dt * (rate + rate_before), APART + PULL * dt * dt
+        least, pull = (CAUGHT_UP, CAUGHT_UP_PULL) if late[i // 3] else (APART, PULL)
+        apart, most = change - 0.5 * dt * (rate + rate_before), least + pull * dt * dt
         if apart > most or apart < -most:
             jumps[i] = apart
     return tuple(heard), jumps
@@ -202,10 +205,18 @@ def _in_doubt(watch: SensorWatch, readings: SensorReadings, jumps: dict[int, flo
     doubt, now, q = watch.doubt, readings.time_ns, readings.joint_position
     apart = np.zeros(3 * N)
     apart[list(jumps)] = list(jumps.values())
-    jump = (apart != 0.0).reshape(N, 3).any(axis=1) | _told_before(watch, readings)
+    told_late_ns = told_late(watch.past, watch.readings, readings)
+    jump = (apart != 0.0).reshape(N, 3).any(axis=1) | (told_late_ns > 0)
+    late_ns = np.where(jump, told_late_ns, doubt.late_ns)
+    if doubt.all_at_once and jump.any() and not told_late_ns.any():
+        late_ns = told_late_ns  # what one of them has caught up with, all have
+    if late_ns.any():
+        late_ns = np.where(unknown(watch.past, watch.heard_ns, readings), 0, late_ns)
+    was_late = np.repeat((doubt.late_ns > 0) | (late_ns > 0), 3)
     at_once = doubt.all_at_once or bool(jump.all())
     jumped = np.where(jump, now, doubt.jumped_ns)
-    since, slipped = 1e-9 * np.repeat(now - jumped, 3), doubt.slipped + apart
+    since = 1e-9 * np.repeat(now - jumped, 3)
+    slipped = np.where(was_late, 0.0, doubt.slipped + apart)
     dt = 1e-9 * (now - watch.readings.time_ns)
     mean = doubt.told + np.where(np.isfinite(q), np.maximum(
         dt / np.maximum(since, dt), _share(dt)) * (q - doubt.told), 0.0)
@@ -213,24 +224,14 @@ def _in_doubt(watch: SensorWatch, readings: SensorReadings, jumps: dict[int, flo
         np.abs(mean - watch.usual) <= ALIKE).reshape(N, 3).all(axis=1)
     count = doubt.count + jump
     odd = np.where(alike & ~jump, doubt.odd_ns, now)
-    legs = (jump | doubt.legs) & (now - odd < JOINTS_NS) & ~(
-        (count >= MANY) & (now - jumped >= CALM_NS))
+    legs = (jump | doubt.legs) & ((late_ns > 0) | (now - odd < JOINTS_NS) & ~(
+        (count >= MANY) & (now - jumped >= CALM_NS)))
     if at_once:
         legs = np.full(N, legs.any())
     if not legs.any():
         return NOBODY
     return Doubt(tuple(legs.tolist()), at_once, count * legs, jumped, odd,
-                 np.where(np.repeat(legs, 3), slipped, 0.0), mean)
-
-
-def _told_before(watch: SensorWatch, readings: SensorReadings) -> Array:
-    """Which legs of a robot that moves tell what they told before the last tick, (4,) bool."""
-    if not (watch.past and np.abs(np.nan_to_num(readings.joint_velocity)).max() > MOVING):
-        return np.zeros(N, bool)
-    told, *before = (np.stack((of.joint_position, of.joint_velocity)).reshape(2, N, 3)
-                     for of in (readings, watch.readings, *watch.past))
-    same = (np.array(before) == told).all(axis=(1, 3))  # (n, 4)
-    return np.asarray(same[1:].any(axis=0) & ~same[0])
+                 np.where(np.repeat(legs, 3), slipped, 0.0), mean, late_ns * legs)
 
 
 def _share(dt: float) -> float:
