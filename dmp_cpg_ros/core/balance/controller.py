@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dmp_cpg_ros.core.balance import virtual_model
+from dmp_cpg_ros.core.balance import unfelt, virtual_model
 from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.capture_point import support_margins
 from dmp_cpg_ros.core.balance.corrections import MassOffset, VelocityCorrection
@@ -34,7 +34,6 @@ from dmp_cpg_ros.core.balance.terrain import (
     Terrain,
     contacts,
 )
-from dmp_cpg_ros.core.balance.unfelt import as_planned, borne_by_others
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
@@ -77,6 +76,8 @@ class PostureState(NamedTuple):
         Where the centre of mass is found to be.
     terrain : Terrain
         What the feet have felt of the ground.
+    back : unfelt.ComingBack
+        Whether what is felt again is late.
     """
 
     activity: Array
@@ -84,6 +85,7 @@ class PostureState(NamedTuple):
     plan: MotionPlan = MotionPlan()
     offset: MassOffset = MassOffset()
     terrain: Terrain = NOTHING_FELT
+    back: unfelt.ComingBack = unfelt.SOUND
 
 
 class Stride(NamedTuple):
@@ -144,8 +146,7 @@ class PostureController:
         self.foot_radius = float(np.mean([leg.foot_radius for leg in description.legs]))
         self._quarter_weight = quarter_weight(description)
         self._com_in_base = vec3.triple(description.com_in_base.tolist())
-        self._torque_limit = [
-            float(most) for leg in description.legs for most in leg.torque_limit]
+        self._torque_limit = [float(most) for leg in description.legs for most in leg.torque_limit]
         # moments count as the accelerations that they cause at the length of a leg
         importance = description.mass * self.scale.leg_length / description.base_inertia.diagonal()
         self._importance = vec3.triple(importance.tolist())
@@ -186,11 +187,11 @@ class PostureController:
         R_world_base = vec3.rotation(state.base_quaternion.tolist())
         normal, share = state.ground_normal_in_world, memory.terrain.followed
         R_ground_base, upward = ground_from_base(R_world_base, normal, p.slope_following * share)
-        if (felt := state.felt_legs) is not None:
-            if state.feels_nothing:
-                R_ground_base = LEVEL_WITH_GROUND
-            state = as_planned(state, self.kinematics, self._nominal, stride.reference,
-                               stride.own_omegas, stride.duty, stride.positions)
+        back, state = memory.back.felt(state, unfelt.PlannedFeet(
+            self.kinematics, self._nominal, stride.reference, stride.own_omegas, stride.duty,
+            stride.positions), stride.moving, leg_length, dt)
+        if state.feels_nothing:
+            R_ground_base = LEVEL_WITH_GROUND
         velocity = vec3.times(R_ground_base, vec3.triple(state.base_velocity_in_base.tolist()))
         rate = vec3.times(R_ground_base, vec3.triple(state.base_rate_in_base.tolist()))
         plan, integral, offset = self._slow_loops(
@@ -212,10 +213,10 @@ class PostureController:
         lasting = integral.lasting(p, leg_length, plan)
         error = (measured[0] - (planned[0] - lasting[0]), measured[1] - (planned[1] - lasting[1]))
         forces = believed(state.foot_force)
-        terrain, level = self._ground(
-            memory, state, forces, R_world_base, R_ground_base[2], legs, stride, gait, measured,
-            dt)
-        return PostureState(stride.activity, integral, plan, offset, terrain), PostureFeedback(
+        terrain, level = self._ground(memory, state, forces, R_world_base, R_ground_base[2], legs,
+                                      stride, gait, measured, dt)
+        memory = PostureState(stride.activity, integral, plan, offset, terrain, back)
+        return memory, PostureFeedback(
             self._torque(body, legs, feet, stride, planned, self._bounce(gait, stride),
                          acceleration, terrain.empty),
             self._shift(stride, gait, plan.expected, measured, planned, beside, across,
@@ -228,7 +229,7 @@ class PostureController:
             Progress((measured[0], measured[1]), feet_behind(
                 plan.expected, beside, feet, self._footholds, stride.positions, stride.duty,
                 stride.omega), terrain.rough, terrain.gaps, float(terrain.high >= 0)),
-            felt or FELT, level)
+            state.felt_legs or FELT, level)
 
     def _stride(self, activity: Array, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
                 dt: float) -> Stride:
@@ -305,9 +306,7 @@ class PostureController:
 
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], stride: Stride,
                  under: Pair, error: Pair) -> tuple[float, ...]:
-        """Margins of the capture point with an error of the velocity [m/s]; legs that swing count
-        at their footholds, which a slope has downhill.
-        """
+        """Margins of the capture point for an error of the velocity [m/s]; swings at footholds."""
         places, downhill, slope_lean = [], (*under, 0.0), self.parameters.slope_lean
         for foot, foothold, swing in zip(
                 feet, self._footholds, stride.activity.tolist(), strict=True):
@@ -340,7 +339,7 @@ class PostureController:
                 empty: Sequence[bool]) -> Array:
         """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
         force, moment = self.model.wrench(self.parameters, body, r, bounce, acceleration)
-        forces = borne_by_others(
+        forces = unfelt.borne_by_others(
             force, moment, feet, stride.load, empty, self.parameters.friction,
             LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
         torques = [torque for on_foot, (_, J) in zip(forces, legs, strict=True)
