@@ -75,6 +75,8 @@ class Case(NamedTuple):
         Commanded [m/s].
     robot : str
         Its file, in the config folder or by its path.
+    first, first_s : str, float
+        How the component has failed just before, and for how long [s]; empty if it has not.
     """
 
     gait: str
@@ -86,18 +88,22 @@ class Case(NamedTuple):
     seed: int = 0
     speed: float = 0.5
     robot: str = 'robots/mini_quadruped.yaml'
+    first: str = ''
+    first_s: float = 0.0
 
 
 def drawn(cell: Cell, seed: int, robots: Sequence[str], lasts: Sequence[float] = LASTS,
-          speeds: Sequence[float] = SPEEDS) -> Case:
+          speeds: Sequence[float] = SPEEDS, first: str = '') -> Case:
     """Draw a case of a cell: leg, duration between two [s], sixteenth of a second, speed [m/s],
-    robot.
+    robot, and for how long it has failed in a first way.
     """
     random, (least, most) = np.random.default_rng((seed, 78)), lasts
-    return Case(*cell, str(random.choice(LEGS)),
+    case = Case(*cell, str(random.choice(LEGS)),
                 round(float(least * (most / least) ** random.random()), 2),
                 int(random.integers(16)) / 16.0, seed, float(random.choice(list(speeds))),
                 str(random.choice(list(robots))))
+    return case if not first else case._replace(
+        first=first, first_s=round(float(least * (most / least) ** random.random()), 2))
 
 
 class Outcome(NamedTuple):
@@ -205,9 +211,13 @@ def trial(case: Case) -> Outcome:
     walk = deepcopy(before, {id(part): part for part in kept})
     walk.injector.seed(case.seed)
     walk.follow(case.speed, case.later_s)
-    walk.injector.add(Fault(case.component, case.kind, case.fails_s,
-                            case.leg if case.component in PLACED else ''), walk.state.time_ns)
-    fell = walk.follow(case.speed, case.fails_s + AFTER_S)
+    fell, leg = False, case.leg if case.component in PLACED else ''
+    if case.first:
+        walk.injector.add(
+            Fault(case.component, case.first, case.first_s, leg), walk.state.time_ns)
+        fell = walk.follow(case.speed, case.first_s)
+    walk.injector.add(Fault(case.component, case.kind, case.fails_s, leg), walk.state.time_ns)
+    fell = walk.follow(case.speed, case.fails_s + AFTER_S) or fell
     walked = walk.loop.stop.state == 'walking'
     walk.loop.request(True)
     rested = 0
@@ -242,6 +252,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                         help='between what the time of a failure is drawn (default: 0.1 2)')
     parser.add_argument('--speeds', nargs='+', type=float, default=SPEEDS, metavar='M/S',
                         help='from what the speed is drawn (default: 0.5 1)')
+    parser.add_argument('--first', choices=KINDS, default='',
+                        help='how what is drawn fails before, for as long as it may')
     parser.add_argument('--robots', nargs='+', default=[Case._field_defaults['robot']],
                         metavar='FILE', help='of which one is drawn')
     return run_command(parser, arguments, _study)
@@ -251,7 +263,8 @@ def _study(options: argparse.Namespace, _: Any) -> int:
     cells = [(gait, component, kind) for gait in options.gaits
              for component in options.components for kind in options.kinds]
     seeds = range(options.seed, options.seed + (options.draws or 0))
-    cases = {cell: [drawn(cell, seed, options.robots, options.lasts, options.speeds)
+    cases = {cell: [drawn(cell, seed, options.robots, options.lasts, options.speeds,
+                         options.first)
                     for seed in seeds]
              if options.draws else [Case(*cell)] for cell in cells}
     outcomes = study([case for of in cases.values() for case in of],

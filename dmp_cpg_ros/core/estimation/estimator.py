@@ -164,7 +164,7 @@ class BodyEstimator:
         state, _ = velocity_filter.update(
             state, rate, motion.contact_in_base, motion.velocity_in_base, trust, noise)
         rests = seeing and min(trust) > 0.0 and _is_still(readings, state)
-        if blind > BLIND:
+        if blind > BLIND and any(trust):  # footholds that no foot tells anew do not turn with it
             state = replace_unchecked(state, quaternion=leg_odometry.levelled_by_feet(
                 state.quaternion, memory.terrain, LEVELLING * dt))
         still = memory.still + dt if rests else 0.0

@@ -181,6 +181,25 @@ def test_impossible_numbers_count_as_missing(exact: list[SensorReadings], value:
     assert np.abs(errors(estimates)).max() < 0.01
 
 
+def test_a_body_that_feels_nothing_keeps_its_vertical(exact: list[SensorReadings]) -> None:
+    """Without IMU it follows the feet; footholds that nobody feels any more do not turn with it,
+    and turned it on and on.
+    """
+    def steps(memory: EstimatorState) -> EstimatorState:
+        feet = tuple((x, y, z + 0.03 * (i < 2))
+                     for i, (x, y, z) in enumerate(memory.terrain.foothold_in_world))
+        return dataclasses.replace(memory, terrain=dataclasses.replace(
+            memory.terrain, foothold_in_world=feet))
+
+    begins = 200
+    estimates = run(exact, lambda k, reading: reading if k <= begins else spoiled(
+        reading, joint_position=slice(None), joint_velocity=slice(None),
+        rate_in_base=slice(None), specific_force_in_base=slice(None), foot_force=slice(None)),
+        kick=(begins, steps))
+    up = [rotation(of.quaternion.tolist())[2] for of in (estimates[begins + 10], estimates[-1])]
+    assert estimates[-1].problems and np.allclose(*up, atol=1e-3)
+
+
 def test_it_can_begin_with_bad_sensors(exact: list[SensorReadings]) -> None:
     everything = FAILURES['everything'][0]
     estimates = run(exact, lambda k, r: spoiled(r, **everything) if k < 3 else r)
