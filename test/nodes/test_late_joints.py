@@ -79,7 +79,7 @@ def test_late_and_lost_messages_put_no_leg_in_doubt(gait: str, speed: float, see
         if watch is None or not 0 < stamp_ns - watch.readings.time_ns <= FORGOTTEN_NS:
             watch = first_watch(readings)  # as the estimator begins anew
             return
-        watch, passed = without_frozen(watch, readings)
+        watch, passed = without_frozen(watch, readings, 100.0)
         assert not any(watch.doubt.legs), f'at {stamp_ns * 1e-9:.3f} s'
         felt.append(all(passed.usable_legs) and passed.imu_is_usable)
 

@@ -141,7 +141,7 @@ class BodyEstimator:
         """
         if memory is None or readings.time_ns <= memory.estimate.time_ns:
             return self._begin(readings)
-        watch, told = frozen.without_frozen(memory.watch, readings)
+        watch, told = frozen.without_frozen(memory.watch, readings, self._weight)
         readings = frozen.without_imu(told) if memory.imu.doubted_s else told
         dt = time_step(memory.estimate.time_ns, readings.time_ns)
         seeing = readings.imu_is_usable

@@ -5,7 +5,8 @@
 What repeats to the last bit while the robot moves is no reading any more. Noise changes the last
 bits of every real one, but those of joints at rest: joints are judged while others move, and so is
 everything else; contacts while the force of another one changes. No body changes its turn rate by
-``JUMP`` from one tick to the next.
+``JUMP`` from one tick to the next, and no foot is held by the ground: a contact that pulls tells
+anything.
 
 Angles and velocities of a joint tell the same motion twice: over a time t its angle changes by
 the mean velocity times t, but for what accelerations change meanwhile, which goes with t²; t is
@@ -46,6 +47,9 @@ JUMP, STEADY_NS = 8.0, 100_000_000
 repeated itself that was frozen, or jumped, to be believed [ns]: what is new now and then mostly
 tells what was, and of what tells anything a reading now and then lies near the truth.
 """
+
+HELD = 0.1
+"""Pull on a foot that is none, in weights of the robot: sensors are off by less."""
 
 APART, PULL, JOINTS_NS = 0.06, 2500.0, 600_000_000
 """Change of a joint's angle apart from what its velocity says [rad], more by that [rad/s²] times
@@ -152,9 +156,11 @@ def first_watch(readings: SensorReadings) -> SensorWatch:
     return SensorWatch(readings, NEVER, usable, NEVER, (now,) * (3 * N), usable, NOBODY)
 
 
-def without_frozen(watch: SensorWatch, readings: SensorReadings
+def without_frozen(watch: SensorWatch, readings: SensorReadings, weight: float
                    ) -> tuple[SensorWatch, SensorReadings]:
-    """Readings in which those of sensors that freeze or jump are missing (NaN)."""
+    """Readings in which those of sensors that freeze, jump or pull are missing (NaN), of a robot
+    with a weight [N].
+    """
     last, heard, jumps = watch.readings, watch.heard_ns, dict[int, float]()
     if readings.joints_ns >= last.joints_ns:
         heard, jumps = _heard(watch, readings)
@@ -165,7 +171,7 @@ def without_frozen(watch: SensorWatch, readings: SensorReadings
     doubt = watch.doubt
     if jumps or any(doubt.legs):
         doubt = _in_doubt(watch, readings, jumps)
-    told, since, until, passed = _without_repeated(watch, readings)
+    told, since, until, passed = _without_repeated(watch, readings, HELD * weight)
     if any(doubt.legs):
         passed = _without(passed, doubt.all_at_once, doubt.legs, doubt.all_at_once)
     known = _known(watch, passed)
@@ -239,17 +245,20 @@ def _share(dt: float) -> float:
     return min(dt / USUAL_S, 1.0)
 
 
-def _without_repeated(watch: SensorWatch, readings: SensorReadings) -> tuple[
+def _without_repeated(watch: SensorWatch, readings: SensorReadings, most: float) -> tuple[
         SensorReadings, tuple[int, ...], tuple[int, ...], SensorReadings]:
-    """Without those of sensors that repeat themselves, and of a gyroscope that jumps: what to
-    compare the next ones with, since when what repeats, until when what is in doubt, and the
-    readings.
+    """Without those of sensors that repeat themselves, of a gyroscope that jumps, and of contacts
+    that pull by more than they may [N]: what to compare the next ones with, since when what
+    repeats, until when what is in doubt, and the readings.
     """
     last, now, until = watch.readings, readings.time_ns, watch.until_ns
     turning, before = triple(readings.rate_in_base.tolist()), triple(last.rate_in_base.tolist())
     change = minus(turning, before)
     if max(change) > JUMP or min(change) < -JUMP:
         until = (now + STEADY_NS, *until[1:])
+    if any(pulls := [force < -most for force in readings.foot_force.tolist()]):
+        until = (*until[:1 + N], *(now + STEADY_NS if of else end for of, end in zip(
+            pulls, until[1 + N:], strict=True)))
     rates, q = readings.joint_velocity, readings.joint_position
     repeated, force = q == last.joint_position, _repeated_forces(readings, last)
     # A simulated body may ride level, without any noise.

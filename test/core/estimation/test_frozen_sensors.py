@@ -14,13 +14,14 @@ from dmp_cpg_ros.core.estimation.frozen import (
     CALM_NS,
     FROZEN_NS,
     JOINTS_NS,
+    STEADY_NS,
     first_watch,
     with_joints,
     without_frozen,
 )
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 
-TICK_NS, RNG = 4_000_000, np.random.default_rng(0)
+TICK_NS, WEIGHT, RNG = 4_000_000, 50.0, np.random.default_rng(0)
 
 
 def readings(k: int, *, moving: bool = True) -> SensorReadings:
@@ -41,7 +42,7 @@ def watched(change: object = None, *, moving: bool = True, ticks: int = 40) -> S
         told = readings(k, moving=moving)
         for name, part in (change or {}).items():  # type: ignore[attr-defined]
             getattr(told, name)[part] = getattr(first, name)[part]
-        watch, passed = without_frozen(watch, told)
+        watch, passed = without_frozen(watch, told, WEIGHT)
     return with_joints(watch, passed) if change is None else passed
 
 
@@ -75,7 +76,7 @@ def test_a_robot_without_noise_is_not_frozen() -> None:
     watch = first_watch(replace(readings(0), **ideal))
     for k in range(1, 40):
         told = replace(readings(k), **ideal)
-        watch, passed = without_frozen(watch, told)
+        watch, passed = without_frozen(watch, told, WEIGHT)
         assert passed is told
 
 
@@ -85,7 +86,7 @@ def test_joints_that_are_missing_stand_where_they_were_known_last() -> None:
     judged = SensorReadings(*(getattr(told, name) for name in (
         'time_ns', 'joint_position', 'joint_velocity', 'joint_effort', 'rate_in_base',
         'specific_force_in_base', 'foot_force')))
-    watch, passed = without_frozen(first_watch(first), judged)
+    watch, passed = without_frozen(first_watch(first), judged, WEIGHT)
     filled = with_joints(watch, passed)
     np.testing.assert_array_equal(filled.joint_position[6:9], first.joint_position[6:9])
     assert not filled.joint_velocity[6:9].any()
@@ -97,7 +98,7 @@ def test_a_turn_rate_that_jumps_is_not_believed_for_a_while() -> None:
     for k in range(1, 60):
         told = readings(k)
         told.rate_in_base[:] += 50.0
-        watch, passed = without_frozen(watch, told)
+        watch, passed = without_frozen(watch, told, WEIGHT)
         seen.append(passed.imu_is_usable)
     assert not any(seen[:20]) and all(seen[30:])
 
@@ -108,7 +109,7 @@ def usable_imu(change: Callable[[int, SensorReadings], None], ticks: int) -> lis
     for k in range(1, ticks):
         told = readings(k)
         change(k, told)
-        watch, passed = without_frozen(watch, told)
+        watch, passed = without_frozen(watch, told, WEIGHT)
         seen.append(passed.imu_is_usable)
     return seen
 
@@ -141,6 +142,21 @@ def test_an_imu_that_is_new_now_and_then_only_is_not_believed() -> None:
     assert all(seen[530:])
 
 
+def test_a_contact_that_pulls_is_not_believed_for_a_while() -> None:
+    """What tells anything does so every other time; one that is off by a little does not."""
+    def spoil(k: int, told: SensorReadings) -> None:
+        told.foot_force[2] -= 10.0 + 0.05 * WEIGHT  # about what it tells without load
+        if 100 <= k < 200:
+            told.foot_force[1] = 500.0 * np.random.default_rng(k).normal()
+
+    passed = judged(spoil, 300)
+    first = next(k for k in range(100, 200) if 500.0 * np.random.default_rng(k).normal() < -WEIGHT)
+    contacts = np.array([sound.usable_contacts for sound in passed])
+    assert first < 105 and contacts[:, (0, 2, 3)].all() and contacts[:99, 1].all()
+    assert not contacts[first - 1:199, 1].any() and contacts[199 + STEADY_NS // TICK_NS:, 1].all()
+    assert all(sound.imu_is_usable and all(sound.usable_legs) for sound in passed)
+
+
 def swing(k: int, told: SensorReadings) -> None:
     """Let all joints swing as those of a walking robot do."""
     phase = 2.0 * np.pi * 1e-9 * TICK_NS * k / 0.5 + np.arange(12)
@@ -166,7 +182,7 @@ def judged(spoil: Callable[[int, SensorReadings], None], ticks: int = 500) -> li
         told = readings(k)
         spoil(k, told)
         told = replace(told)  # judges anew
-        watch, sound = without_frozen(watch, told)
+        watch, sound = without_frozen(watch, told, WEIGHT)
         passed.append(sound)
     return passed
 
