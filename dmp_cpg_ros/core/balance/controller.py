@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.capture_point import support_margins
 from dmp_cpg_ros.core.balance.corrections import MassOffset, VelocityCorrection
 from dmp_cpg_ros.core.balance.feedback import FELT, PostureFeedback
-from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, lean
+from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, lean, turned_back
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.balance.progress import feet_behind
@@ -219,7 +219,8 @@ class PostureController:
         return memory, PostureFeedback(
             self._torque(body, legs, feet, stride, planned, self._bounce(gait, stride),
                          acceleration, terrain.empty),
-            self._shift(stride, gait, plan.expected, measured, planned, beside, across,
+            self._shift(stride, gait, plan.expected, measured, planned,
+                        turned_back(beside, under, R_ground_base[2], self.model.height), across,
                         R_ground_base, level if terrain.barred else LEVEL_FEET),
             np.array(self.placement.drift(
                 self.placement.yielding(p, stride.reference[0], gait.firm, plan.acceleration),

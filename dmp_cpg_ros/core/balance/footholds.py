@@ -54,6 +54,10 @@ that soft ground and compliant feet feign.
 """
 
 
+STEEP = (0.05, 0.1)
+"""Slopes between which feet come to be placed by how a body is tilted on them, too."""
+
+
 class FootPlacement:
     """Placement for one robot's feet.
 
@@ -348,3 +352,35 @@ def lean(upward_in_ground: Triple, height: float) -> tuple[float, float]:
     x, y, z = upward_in_ground
     depth = -height / max(z, 0.3)
     return depth * x, depth * y
+
+
+def turned_back(beside: Pair, under: Pair, normal_in_base: Triple, height: float) -> Pair:
+    """Shift of footholds in a base that is tilted against the ground, from that in its frame.
+
+    A tilt takes the neutral places along, by h sin θ away from the side to which the body falls.
+    Where hills change faster than the body and the estimate of their slope follow, it is as large
+    as the slope, and what leans the feet downhill made them stand beyond the body. On slopes below
+    the first of ``STEEP`` the shift stays as it is.
+
+    Parameters
+    ----------
+    beside : pair of float
+        Shift in the frame of the ground [m].
+    under : pair of float
+        As from :func:`lean` [m].
+    normal_in_base : tuple of float
+        Of the ground; (0, 0, 1) where the body is parallel to it.
+    height : float
+        h, of the centre of mass over the ground [m].
+
+    Returns
+    -------
+    pair of float
+        [m]
+    """
+    gentle, steep = STEEP
+    share = (hypot(*under) / height - gentle) / (steep - gentle)
+    if share <= 0.0:
+        return beside
+    way = -height * min(share, 1.0)
+    return beside[0] + way * normal_in_base[0], beside[1] + way * normal_in_base[1]

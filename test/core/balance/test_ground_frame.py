@@ -7,7 +7,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.balance.footholds import SLIGHT, ground_from_base, lean
+from dmp_cpg_ros.core.balance.footholds import (
+    SLIGHT,
+    STEEP,
+    ground_from_base,
+    lean,
+    turned_back,
+)
 from dmp_cpg_ros.core.estimation.leg_odometry import normal_in_world
 from dmp_cpg_ros.core.maths.rotations import turned
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, rotation
@@ -68,3 +74,32 @@ def test_the_vertical_through_the_body_meets_the_ground_downhill() -> None:
     shift = lean(upward, 0.3)
     assert shift[0] == pytest.approx(-0.3 * np.tan(angle), rel=0.03)  # uphill is ahead
     assert shift[1] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize('turn', [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (-0.1, 0.4, 0.5)])
+@pytest.mark.parametrize('slope', [(0.25, 0.0), (-0.1, 0.3), (0.0, -0.2)])
+def test_on_a_slope_feet_stand_around_the_body_however_it_is_tilted(
+        slope: tuple[float, float], turn: tuple[float, float, float]) -> None:
+    R, upward = ground_on(slope, turn)
+    under, normal, height = lean(upward, 0.3), np.array(R[2]), 0.3
+    x, y = turned_back(under, under, R[2], height)
+    down = -(height + normal[:2] @ (x, y)) / normal[2]  # in the plane of the ground
+    along_x, along_y, below = np.array(attitude(turn)) @ (x, y, down)
+    assert np.hypot(along_x, along_y) < 0.06 * height
+    assert below < -0.9 * height
+
+
+@pytest.mark.parametrize('slope', [(0.0, 0.0), (0.04, 0.0), (0.02, -0.03)])
+def test_on_gentle_ground_footholds_know_nothing_of_a_tilt(slope: tuple[float, float]) -> None:
+    R, upward = ground_on(slope, (0.3, -0.2, 0.0))
+    beside = (0.01, -0.02)
+    assert turned_back(beside, lean(upward, 0.3), R[2], 0.3) == beside
+
+
+def test_a_tilt_counts_by_and_by_where_it_begins_to_be_steep() -> None:
+    tilted, shifts = ground_on((0.0, 0.0), (0.2, 0.0, 0.0))[0][2], []
+    for slope in np.linspace(0.0, 2.0 * STEEP[1], 200):
+        shifts.append(turned_back((0.0, 0.0), (-0.3 * slope, 0.0), tilted, 0.3)[1])
+    assert shifts[0] == 0.0
+    assert shifts[-1] == pytest.approx(-0.3 * np.sin(0.2))
+    assert np.max(np.abs(np.diff(shifts))) < 0.03 * 0.3
