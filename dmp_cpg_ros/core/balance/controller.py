@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.capture_point import support_margins
 from dmp_cpg_ros.core.balance.corrections import MassOffset, VelocityCorrection
 from dmp_cpg_ros.core.balance.feedback import FELT, PostureFeedback
-from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, lean, turned_back
+from dmp_cpg_ros.core.balance.footholds import FootPlacement
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.balance.progress import feet_behind
@@ -44,6 +44,7 @@ from dmp_cpg_ros.core.maths import Array, clamped, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Pair, Triple
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.ground_frame import ground_from_base, lean, turned_back
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 from dmp_cpg_ros.core.transformation.foot_path import activities_step, resting
@@ -273,10 +274,9 @@ class PostureController:
         caught = self.placement.caught(measured, planned, gait.apart)
         lanes = self.lanes.aside(
             gait, (*expected, stride.reference[2]), stride.omega, stride.duty)
-        shift = [
-            (x + beside_x, y + (beside_y + aside)) for (x, y), aside in zip(
-                self.placement.shift(p, caught, planned, pi * stride.duty / stride.omega,
-                                     across), lanes, strict=True)]
+        shift = [(x + beside_x, y + (beside_y + aside)) for (x, y), aside in zip(
+            self.placement.shift(p, caught, planned, pi * stride.duty / stride.omega, across),
+            lanes, strict=True)]
         raised = self.placement.raised(p, shift, R_ground_base)
         return np.array([part for (x, y), up, e in zip(shift, raised, level, strict=True)
                          for part in (x, y, up + e)]).reshape(-1, 3)

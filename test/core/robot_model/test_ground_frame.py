@@ -7,16 +7,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.balance.footholds import (
+from dmp_cpg_ros.core.estimation.leg_odometry import normal_in_world
+from dmp_cpg_ros.core.maths.rotations import turned
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, rotation
+from dmp_cpg_ros.core.robot_model.ground_frame import (
     SLIGHT,
     STEEP,
     ground_from_base,
     lean,
     turned_back,
 )
-from dmp_cpg_ros.core.estimation.leg_odometry import normal_in_world
-from dmp_cpg_ros.core.maths.rotations import turned
-from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, rotation
 
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 
