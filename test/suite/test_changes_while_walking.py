@@ -231,7 +231,7 @@ def test_each_node_guards_its_own_parameters_and_follows_the_others(
     inhibition = processes.node('inhibition')
     owner, other = 'canonical_oscillators', 'inhibition'
     for values, words in [
-        ({'cadence_scale': 3.0}, ('capture', 'is not <', 'k_inh = 400', 'cadence_scale = 2.')),
+        ({'cadence_scale': 3.0}, ('capture', 'is not <', 'k_inh = 400', 'cadence_scale = 1.98')),
         ({'cadence_scale': 9.0}, ('range',)),
         ({'cadence_scale': 'fast'}, ('Wrong parameter type', 'DOUBLE')),
         ({'coupling_graph': 'chain'}, ('all_to_all, ring',)),
