@@ -191,7 +191,8 @@ def test_the_node_bears_silent_sensors_and_names_them(processes: Processes, ros:
     assert 'contact of fr, imu' not in told_problems()  # while nodes find each other one may lack
     well = len(feedback)
     ros.spin_until(lambda: ticked(broken=True) and len(feedback) >= well + 50
-                   and 'contact of fr, imu' in told_problems())
+                   and 'contact of fr, imu' in told_problems(),
+                   what=lambda: f'the sensors that are silent; told is: {told_problems()[-600:]}')
     assert all(math.isfinite(value) for message in feedback for value in message.effort)
     process.interrupt()
     assert process.wait() == 0, str(process)
