@@ -83,7 +83,8 @@ class CaptureSet:
 
 
 def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
-                region_radius: float, places: float = PLACE_TOLERANCE) -> CaptureSet:
+                region_radius: float, places: float = PLACE_TOLERANCE, *,
+                contracts: bool = True) -> CaptureSet:
     """Build the invariant set of an inhibited network.
 
     Parameters
@@ -98,6 +99,8 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
         r0 of C_i = {|x_i − x_{i,d}| ≤ r0}.
     places : float
         Largest distance of a node from its place at capture, as a fraction of |x_d|.
+    contracts : bool
+        Whether radii and rate are computed, which are most of the work; 0 and −∞ without.
 
     Returns
     -------
@@ -123,6 +126,8 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     tolerance = places * D
     if np.any(~inhibited):
         tolerance = min(tolerance, float(u[~inhibited].min()) - region_radius)
+    if not contracts:
+        return CaptureSet(u, np.zeros(size), needed, gains, tolerance, -np.inf)
     M = L + np.diag(gains)
     inner = _smallest_radii(system, M, omega, u, D, region_radius, largest, tolerance)
     rate = slowest_rate(M - np.diag(growth(system.rho, system.radius, inner)))

@@ -87,7 +87,7 @@ def equilibrium_near(system: CanonicalSystem, omega: float | Array, gains: Array
     x = _newton(system, near, np.asarray(omega), gains)
     if x is None:
         return None
-    found = _described(system, x, omega, gains)
+    found = described(system, x, omega, gains)
     if found.slowest_rate > 0.0:
         return found
     rates = np.linalg.eigvals(system.jacobian(x, omega, gains))
@@ -115,10 +115,10 @@ def equilibrium_up_to(system: CanonicalSystem, omega: float | Array, gains: Arra
             step *= 0.4
         if share == 1.0 or (following is None and step <= _SMALLEST_STEP):
             break
-    return None if share < 1.0 else _described(system, x, omega, gains), share
+    return None if share < 1.0 else described(system, x, omega, gains), share
 
 
-def _described(system: CanonicalSystem, x: Array, omega: float | Array, gains: Array
+def described(system: CanonicalSystem, x: Array, omega: float | Array, gains: Array
                ) -> InhibitedEquilibrium:
     """Everything about an equilibrium x."""
     rates = np.linalg.eigvals(system.jacobian(x, omega, gains)).real

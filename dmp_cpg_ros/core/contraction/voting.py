@@ -58,7 +58,7 @@ def shared_capture(system: CanonicalSystem, omega: float | Array, capture: Captu
         C in their places need, α (M⁻¹g)/r0; they do not leave the box either.
     """
     found = None if capture.holds else relieved(
-        system, capture, growth_in(system, omega, capture), region_radius)
+        system, capture.gains, growth_in(system, omega, capture), region_radius)
     if found is None or found.spare < 1.0 + SPARE or (
             found.kept(capture.tolerance, region_radius) < 0.0):
         return capture
@@ -126,13 +126,13 @@ class Relieved(NamedTuple):
         return -np.inf
 
 
-def relieved(system: CanonicalSystem, capture: CaptureSet, growth: Array, region_radius: float
+def relieved(system: CanonicalSystem, gains: Array, growth: Array, region_radius: float
              ) -> Relieved | None:
-    """What nodes bear together that grow by at most :func:`growth_in` (N,) [1/s]; None where
-    nothing is known of it.
+    """What nodes that grow by at most :func:`growth_in` (N,) [1/s] bear together under gains (N,)
+    [1/s]; None where nothing is known of it.
     """
-    held, L = ~np.isnan(capture.needed_gain), comparison_laplacian(system.graph)
-    M, most = L + np.diag(capture.gains), float(np.abs(L).max() + capture.gains.max())
+    L, held = comparison_laplacian(system.graph), gains > 0.0
+    M, most = L + np.diag(gains), float(np.abs(L).max() + gains.max())
     if L.sum(axis=1).min() < -1e-9 * most:
         return None
     g = 1e-9 * most * region_radius + growth
@@ -143,7 +143,7 @@ def relieved(system: CanonicalSystem, capture: CaptureSet, growth: Array, region
     if not borne.min() > 0.0:  # so that M is no M-matrix (Berman & Plemmons 1994, 6.2.3)
         return None
     return Relieved(M, g, borne, float((region_radius / borne[held]).min()), held,
-                    np.where(held, capture.gains * borne / region_radius, np.nan))
+                    np.where(held, gains * borne / region_radius, np.nan))
 
 
 @lru_cache(MOST_KEPT)

@@ -17,6 +17,7 @@ from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.equilibrium import (
     InhibitedEquilibrium,
+    described,
     equilibrium_near,
     equilibrium_up_to,
 )
@@ -34,6 +35,7 @@ from dmp_cpg_ros.core.maths.roots import sign_change
 
 _PRECISION = 1e-4
 _MOST_STEPS = 8
+_FIRM = 0.01  # share of r0 by which a rest has to move for a share of α, and of α its rate
 
 
 @dataclass(frozen=True)
@@ -119,17 +121,20 @@ def rest_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequen
     if room(first) < 0.0 and first == known:
         return known
     if rest is not None:
-        low = _at_the_edge(system, omega, voters, rest, first, region_radius)
+        low, passes = _at_the_edge(system, omega, voters, rest, first, region_radius)
         low /= 1.0 + 0.5 * _PRECISION
-        if 0.0 < low < first and room(low) < 0.0 <= room(low * (1.0 + _PRECISION)):
+        if 0.0 < low < first and (
+                passes or room(low) < 0.0 <= room(low * (1.0 + _PRECISION))):
             return low
     return _threshold(room, scale, highest=known)[0]
 
 
 def _at_the_edge(system: CanonicalSystem, omega: float | Array, voters: Sequence[int],
-                 rest: InhibitedEquilibrium, alpha: float, region_radius: float) -> float:
+                 rest: InhibitedEquilibrium, alpha: float, region_radius: float
+                 ) -> tuple[float, bool]:
     """Common α at which the farthest voter rests at the edge of its region, by Newton's method
-    from a rest at another one [1/s]; 0 where it finds none.
+    from a rest at another one [1/s], 0 where it finds none; whether the rest there is certain to
+    be stable, with the others inside, and to pass the edge where α changes by ``_PRECISION``.
     """
     x, N = rest.state, system.graph.size
     node = max(voters, key=lambda voter: float(rest.distance[voter]))
@@ -145,14 +150,19 @@ def _at_the_edge(system: CanonicalSystem, omega: float | Array, voters: Sequence
         try:
             step = np.linalg.solve(slope, np.append(field.ravel(), beyond))
         except np.linalg.LinAlgError:
-            return 0.0
+            break
         x, change = x - step[:-1].reshape(x.shape), float(step[-1])
         if not change < alpha:
-            return 0.0
+            break
         alpha -= change
         if abs(change) < 1e-3 * _PRECISION * alpha:
-            return alpha
-    return 0.0
+            moved = np.linalg.solve(slope[:-1, :-1], slope[:-1, -1]).reshape(x.shape)  # −dx/dα
+            inwards = -alpha * (off * moved).sum(axis=1) / region_radius**2
+            rest = described(system, x, omega, gains)
+            ahead = (rest.distance - 0.5 * _PRECISION * region_radius * inwards)[list(voters)]
+            return alpha, bool(rest.slowest_rate > _FIRM * alpha and inwards[node] > _FIRM
+                               and ahead.max() < region_radius)
+    return 0.0, False
 
 
 def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequence[int],
@@ -167,12 +177,12 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
     float
         Sufficient for a stop [1/s]; infinite when no weight is certified.
     """
-    box = capture_set(system, omega, _votes(system, voters, 1.0), region_radius)
+    box = capture_set(
+        system, omega, _votes(system, voters, 1.0), region_radius, contracts=False)
     needed, growth = float(np.nanmax(box.needed_gain)), growth_in(system, omega, box)
 
     def together(alpha: float) -> Relieved | None:
-        return relieved(system, replace(box, gains=_votes(system, voters, alpha)), growth,
-                         region_radius)
+        return relieved(system, _votes(system, voters, alpha), growth, region_radius)
 
     def spare(alpha: float, found: Relieved | None) -> float:
         return log(max(alpha / needed, found.spare / (1.0 + SPARE) if found else 0.0))
@@ -180,7 +190,7 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
     def room(alpha: float) -> float:
         found = together(alpha)
         beyond = spare(alpha, found)
-        capture = replace(box, gains=_votes(system, voters, alpha), rate=-np.inf)
+        capture = replace(box, gains=_votes(system, voters, alpha))
         if beyond >= 0.0 and found is not None and not capture.holds:
             beyond = found.kept(box.tolerance, region_radius)
             capture = replace(capture, needed_gain=found.needed)
