@@ -17,6 +17,11 @@ that soft ground and compliant feet feign.
 STEEP = (0.05, 0.1)
 """Slopes between which feet come to be placed by how a body is tilted on them, too."""
 
+STEPPED = 0.35
+"""How rough ground is, in heights of the centre of mass, whose slope is of steps: astride one, a
+body that was placed by its tilt went over the foot that the edge held.
+"""
+
 
 def ground_from_base(R_world_base: Matrix, normal_in_world: Array | None, following: float = 1.0
                      ) -> tuple[Matrix, Triple]:
@@ -74,13 +79,14 @@ def lean(upward_in_ground: Triple, height: float) -> tuple[float, float]:
     return depth * x, depth * y
 
 
-def turned_back(beside: Pair, under: Pair, normal_in_base: Triple, height: float) -> Pair:
+def turned_back(beside: Pair, under: Pair, normal_in_base: Triple, height: float,
+                rough: float = 0.0) -> Pair:
     """Shift of footholds in a base that is tilted against the ground, from that in its frame.
 
     A tilt takes the neutral places along, by h sin θ away from the side to which the body falls.
     Where hills change faster than the body and the estimate of their slope follow, it is as large
     as the slope, and what leans the feet downhill made them stand beyond the body. On slopes below
-    the first of ``STEEP`` the shift stays as it is.
+    the first of ``STEEP`` and on ground that is ``STEPPED`` the shift stays as it is.
 
     Parameters
     ----------
@@ -92,6 +98,8 @@ def turned_back(beside: Pair, under: Pair, normal_in_base: Triple, height: float
         Of the ground; (0, 0, 1) where the body is parallel to it.
     height : float
         h, of the centre of mass over the ground [m].
+    rough : float
+        Height of what the feet are lifted over [m].
 
     Returns
     -------
@@ -100,7 +108,8 @@ def turned_back(beside: Pair, under: Pair, normal_in_base: Triple, height: float
     """
     gentle, steep = STEEP
     share = (hypot(*under) / height - gentle) / (steep - gentle)
-    if share <= 0.0:
+    even = 1.0 - rough / (STEPPED * height)
+    if share <= 0.0 or even <= 0.0:
         return beside
-    way = -height * min(share, 1.0)
+    way = -height * min(share, 1.0) * even
     return beside[0] + way * normal_in_base[0], beside[1] + way * normal_in_base[1]

@@ -45,7 +45,7 @@ from dmp_cpg_ros.core.inhibition.blocked import (
 from dmp_cpg_ros.core.inhibition.caution import LEAST
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.grounds import Steps
-from dmp_cpg_ros.studies.walking_trials import Walk
+from dmp_cpg_ros.studies.walking_trials import Walk, obstacle
 
 LENGTH = 0.28
 FROUDE = (GRAVITY * LENGTH) ** 0.5
@@ -248,6 +248,13 @@ def test_before_a_step_that_it_does_not_climb_it_stands(gait: str) -> None:
     run.loop.command(-0.3)
     assert run.walk(3.0)
     assert place - run.state.base_position_in_world[0] > 0.3
+
+
+@pytest.mark.parametrize(('gait', 'seed'), [('trot', 9), ('trot', 710), ('amble', 508)])
+def test_astride_a_step_that_it_may_climb_or_not_it_does_not_fall(gait: str, seed: int) -> None:
+    """Feet placed by the body's tilt on what was taken for a slope once threw it over the edge."""
+    outcome = obstacle(gait, 0.16, seed)
+    assert outcome.stopped and not outcome.fell
 
 
 def test_before_a_block_it_stands_and_walks_away() -> None:

@@ -13,6 +13,7 @@ from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, rotation
 from dmp_cpg_ros.core.robot_model.ground_frame import (
     SLIGHT,
     STEEP,
+    STEPPED,
     ground_from_base,
     lean,
     turned_back,
@@ -94,6 +95,16 @@ def test_on_gentle_ground_footholds_know_nothing_of_a_tilt(slope: tuple[float, f
     R, upward = ground_on(slope, (0.3, -0.2, 0.0))
     beside = (0.01, -0.02)
     assert turned_back(beside, lean(upward, 0.3), R[2], 0.3) == beside
+
+
+def test_a_tilt_counts_less_the_rougher_the_ground_and_not_where_its_slope_is_of_steps() -> None:
+    R, upward = ground_on((0.3, 0.1), (0.3, -0.2, 0.0))
+    beside, under = (0.01, -0.02), lean(upward, 0.3)
+    turned = [np.subtract(turned_back(beside, under, R[2], 0.3, rough), beside)
+              for rough in (0.0, 0.15 * STEPPED, STEPPED * 0.3, 0.2)]
+    assert np.abs(turned[0]).max() > 0.05
+    np.testing.assert_allclose(turned[1], 0.5 * turned[0])
+    np.testing.assert_allclose(turned[2:], 0.0, atol=1e-12)
 
 
 def test_a_tilt_counts_by_and_by_where_it_begins_to_be_steep() -> None:
