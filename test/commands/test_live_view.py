@@ -339,6 +339,9 @@ def test_a_view_that_ends_lets_go(client: Client, suite: Processes, ros: Ros) ->
 
 BROWSER = find_browser()
 
+COARSE = 0.25
+"""Scale of a page at whose picture nobody looks."""
+
 
 @pytest.fixture(scope='module')
 def page() -> Iterator[Page]:
@@ -405,7 +408,7 @@ def drive(page: Page, ros: Ros) -> None:
 def test_in_a_browser_the_robot_is_driven_pushed_and_stopped(
         client: Client, page: Page, ros: Ros) -> None:
     at_rest(client)
-    page.open(client.address, 900, 640)
+    page.open(client.address, 900, 640, scale=COARSE)
     drive(page, ros)
     frame = client.until(lambda frame: frame['at_rest'])
     assert frame['requested'] and frame['stop']['automatic'] == 'false'
@@ -419,7 +422,7 @@ def press(page: Page, button: str) -> None:
 def test_in_a_browser_the_body_lies_down_and_stands_up_and_the_gait_is_chosen(
         client: Client, page: Page) -> None:
     at_rest(client)
-    page.open(client.address, 900, 640)
+    page.open(client.address, 900, 640, webgl=False)
     page.until(state('at rest'))
     mode = "document.querySelector('#mode').textContent"
     page.until(f"{mode} === 'standing'")
@@ -439,7 +442,7 @@ def test_in_a_browser_the_body_lies_down_and_stands_up_and_the_gait_is_chosen(
 @pytest.mark.parametrize('released', ['W', 'Meta'])
 def test_a_key_that_is_released_with_shift_or_meta_drives_no_more(
         client: Client, page: Page, released: str) -> None:
-    page.open(client.address, 900, 640)
+    page.open(client.address, 900, 640, webgl=False)
     ahead = "document.querySelector('#command').textContent.startsWith('0.50 m/s')"
     page.until(f"document.querySelector('#robot').textContent && !({ahead})")
     page.key('keyDown', 'w')
@@ -453,7 +456,7 @@ def test_a_key_that_is_released_with_shift_or_meta_drives_no_more(
 def test_the_space_bar_stops_the_robot_whatever_was_clicked_before(
         client: Client, page: Page, touched: str) -> None:
     at_rest(client)
-    page.open(client.address, 900, 640)
+    page.open(client.address, 900, 640, webgl=False)
     page.until(state('at rest'))
     client.drive()
     page.click(touched)
@@ -468,7 +471,7 @@ def test_the_space_bar_stops_the_robot_whatever_was_clicked_before(
 def test_a_gamepad_drives_and_stops_the_robot(client: Client, page: Page, ros: Ros) -> None:
     at_rest(client)
     references = heard(ros, 'reference')
-    page.open(client.address, 900, 640)
+    page.open(client.address, 900, 640, webgl=False)
     page.until(state('at rest'))
 
     def held(axes: str, button: int | None = None) -> None:
@@ -506,7 +509,8 @@ def test_make_demo_gives_an_address_at_which_the_robot_is_driven_pushed_and_stop
         processes = Processes(domain)
         try:
             walk = processes.start('bash', '-c', command)
-            page.open(walk.wait_for_output(ADDRESS, PATIENCE_S)[1], 900, 640)
+            page.open(walk.wait_for_output(ADDRESS, PATIENCE_S)[1], 900, 640,
+                      scale=COARSE)
             drive(page, ros)
             page.open('about:blank')  # which asks nobody who has ended
             os.killpg(walk.pid, signal.SIGINT)  # as a terminal does

@@ -23,6 +23,14 @@ FLAGS = ('--headless=new', '--no-sandbox', '--remote-debugging-pipe', '--no-firs
          '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-sync',
          '--disable-component-update', '--no-proxy-server')
 
+WITHOUT_WEBGL = """
+const context = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...options) {
+  return kind === 'webgl2' ? null : context.call(this, kind, ...options);
+};
+"""
+"""What runs before a page that has none."""
+
 DEADLINE_S = 60.0
 """How long a page may take [s]; a loaded machine is no failure."""
 
@@ -75,14 +83,20 @@ class Page:
                 return dict(message['result'])
             self._note(message.get('method', ''), message.get('params', {}))
 
-    def open(self, address: str, width: int = 1400, height: int = 900, *, scale: int = 1,
-             touch: bool = False) -> None:
-        """Go to an address, in a window of a size [pixels], of a telephone perhaps."""
+    def open(self, address: str, width: int = 1400, height: int = 900, *, scale: float = 1,
+             touch: bool = False, webgl: bool = True) -> None:
+        """Go to an address, in a window of a size [pixels], of a telephone perhaps; without WebGL,
+        which takes a core where there is no graphics card.
+        """
         self.resize(width, height, scale=scale, touch=touch)
+        without = '' if webgl else self.call(
+            'Page.addScriptToEvaluateOnNewDocument', source=WITHOUT_WEBGL)['identifier']
         self.call('Page.navigate', url=address)
         self.until(f"location.href === {address!r} && document.readyState === 'complete'")
+        if without:
+            self.call('Page.removeScriptToEvaluateOnNewDocument', identifier=without)
 
-    def resize(self, width: int, height: int, *, scale: int = 1, touch: bool = False) -> None:
+    def resize(self, width: int, height: int, *, scale: float = 1, touch: bool = False) -> None:
         """Give the window another size."""
         self.call('Emulation.setDeviceMetricsOverride', width=width, height=height,
                   deviceScaleFactor=scale, mobile=touch)
