@@ -11,11 +11,11 @@ where nothing else computes. Exit status 1 when a step was refused, or a process
 from __future__ import annotations
 
 import argparse
-import subprocess
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import yaml
@@ -55,6 +55,8 @@ class Rehearsal:
     ----------
     group : ProcessGroup
         Runs them.
+    server : ForkServer
+        Runs the clients that ask.
     folder : Path
         For the suite's parameters, and what the robot measures.
     rate_hz : float
@@ -63,10 +65,11 @@ class Rehearsal:
         Of the low-level robot.
     """
 
-    def __init__(self, group: ProcessGroup, folder: Path, rate_hz: float,
+    def __init__(self, group: ProcessGroup, server: ForkServer, folder: Path, rate_hz: float,
                  longest_lag_s: float) -> None:
         """Start them."""
-        self._group, self._measured = group, folder / 'measured.json'
+        self._group, self._server = group, server
+        self._measured = folder / 'measured.json'
         content = load_yaml(find_config('suite.yaml'))
         content['/**']['ros__parameters'] |= {
             'start_mode': 'lying', 'control_rate': rate_hz,
@@ -89,13 +92,15 @@ class Rehearsal:
         RehearsalError
             If it is refused, or a process has ended.
         """
-        done = subprocess.run(
-            [sys.executable, '-m', 'dmp_cpg_ros', 'robot_client', '--wait', f'{WITHIN_S:g}',
-             *words], capture_output=True, text=True, check=False)
+        with TemporaryFile() as output:
+            status = self._server.start(
+                ['robot_client', '--wait', f'{WITHIN_S:g}', *words],
+                output.fileno(), output.fileno()).wait()
+            output.seek(0)
+            answer = output.read().decode(errors='replace').strip()
         if lost := self._group.ended():
             raise RehearsalError('; '.join(lost.values()))
-        answer = (done.stdout + done.stderr).strip()
-        if done.returncode:
+        if status:
             raise RehearsalError(f'{" ".join(words)}: {answer}')
         return answer
 
@@ -152,7 +157,7 @@ def _main(options: argparse.Namespace, _: RosArguments) -> int:
     with folder_of_logs(options.logs) as folder, alone_in_domain(''), ForkServer() as server:
         group = ProcessGroup(folder, server)
         try:
-            robot = Rehearsal(group, folder, options.rate, options.longest_lag)
+            robot = Rehearsal(group, server, folder, options.rate, options.longest_lag)
             try:
                 cores = _walk(robot, options.speed, options.seconds)
             except RehearsalError as error:

@@ -41,7 +41,8 @@ SETTLED_NS = 1_000_000_000
 
 AT_USUAL_RATE = ('README.md',)
 """Documents that show numbers which depend on the control rate; the walks of all others are
-typed with the option of another one: the machine has less to do.
+typed with the option of another one, and their parameter files have it: the machine has less to
+do.
 """
 
 RATE_HZ = 100.0
@@ -141,7 +142,9 @@ def reader(document: Path, tmp_path: Path) -> Iterator[Reader]:
 @pytest.mark.parametrize('document', TRANSCRIPTS, ids=lambda document: document.name)
 def test_what_the_transcripts_show_is_what_happens(reader: Reader, document: Path) -> None:
     for name, content in files(document).items():
-        (reader.folder / name).write_text(content, encoding='utf-8')
+        slower = f'\\g<0>\n    control_rate: {RATE_HZ}' if reader.options else '\\g<0>'
+        (reader.folder / name).write_text(
+            re.sub('ros__parameters:$', slower, content, flags=re.MULTILINE), encoding='utf-8')
     happened = [(command, shown, reader.type(command)) for command, shown in transcript(document)]
     assert any(shown for _, shown, _ in happened)
     wrong = [f'$ {command}\n{printed}--- {document.name} shows ---\n{shown}'

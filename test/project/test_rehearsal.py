@@ -120,10 +120,14 @@ def test_a_step_that_is_refused_costs_no_figure(
         ros_domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[str],
         monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / 'measured.json'
-    monkeypatch.setattr(rehearsal, 'COMES_WITHIN_S', 5.0)
     becomes = rehearsal.Rehearsal.becomes
-    monkeypatch.setattr(rehearsal.Rehearsal, 'becomes', lambda robot, topic, state: becomes(
-        robot, topic, 'flying' if topic == 'drive_mode' else state))
+
+    def flying(robot: rehearsal.Rehearsal, topic: str, state: str) -> None:
+        becomes(robot, topic, state)
+        monkeypatch.setattr(rehearsal, 'COMES_WITHIN_S', 0.0)
+        becomes(robot, topic, 'flying')
+
+    monkeypatch.setattr(rehearsal.Rehearsal, 'becomes', flying)
     assert rehearsal.main([*PATIENT, '--rate', str(SHARED_HZ), '--json', str(file)]) == 1
     said, measured = capsys.readouterr(), json.loads(file.read_text(encoding='utf-8'))
     assert 'drive_mode is not flying' in said.err and 'real-time factor' in said.out
