@@ -168,7 +168,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     parser = argparse.ArgumentParser(prog='intruder', description=(__doc__ or '').split('\n')[0])
     parser.add_argument('--duration', type=float, default=60.0, metavar='S',
-                        help='time of attacks [s]; each is tried once before any is tried again')
+                        help='time of attacks [s]; each is tried once at least, and before any '
+                        'is tried again')
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--composed', action='append_const', dest='walk', const='--composed',
                         default=[], help='all nodes in one process')
@@ -192,7 +193,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             suite.start(node)
             end, left = time.monotonic() + options.duration, list[str]()
-            while time.monotonic() < end:
+            while len(outcomes) < len(names) or time.monotonic() < end:
                 left = left or node.draw.sample(names, len(names))
                 outcomes.append(attacked(node, suite, left.pop()))
                 print(outcomes[-1], flush=True)
