@@ -41,9 +41,10 @@ def told_late(past: Sequence[SensorReadings], last: SensorReadings, readings: Se
     """
     if not (past and np.abs(np.nan_to_num(readings.joint_velocity)).max() > MOVING):
         return np.zeros(N, int)
-    told, *before = (np.stack((of.joint_position, of.joint_velocity)).reshape(2, N, 3)
-                     for of in (readings, last, *past))
-    same = (np.array(before) == told).all(axis=(1, 3))  # (n, 4)
+    before = last, *past
+    repeated = ((np.array([of.joint_position for of in before]) == readings.joint_position)
+                & (np.array([of.joint_velocity for of in before]) == readings.joint_velocity))
+    same = repeated.reshape(-1, N, 3).all(axis=2)  # (n, 4)
     age_ns = readings.time_ns - np.array([of.time_ns for of in past])
     return np.where(same[0], 0, (same[1:] * age_ns[:, None]).max(axis=0))
 
