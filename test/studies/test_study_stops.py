@@ -52,7 +52,7 @@ def test_gaits_are_those_of_the_parameter_file(
         'gaits: {canter: {lag: {fl: 0, fr: 0.7, rl: 0.7, rr: 0.4}, speed: [0, 0.6], '
         'cadence: [0.4, 0.55], duty_factor: [0.65, 0.55]}}\n')
     file = tmp_path / 'suite.yaml'
-    file.write_text(f"/**: {{ros__parameters: {{gait: canter, gaits_file: "
+    file.write_text(f"/**: {{ros__parameters: {{control_rate: 100.0, gait: canter, gaits_file: "
                     f"'{tmp_path / 'gaits.yaml'}'}}}}\n")
     assert main([str(file), '--gaits', 'canter', '--speeds', '0.3', '--phases', '1', '--no-resume',
                  '--quiet', '--jobs', '1']) == 0
@@ -184,22 +184,29 @@ def test_a_body_that_brakes_stands_when_it_was_told_to(
         assert of.standing and of.stands_s == pytest.approx(of.still_s, rel=0.1)
 
 
+def slower(folder: Path) -> str:
+    """A parameter file with fewer ticks, for what does not depend on how many there are."""
+    file = folder / 'slower.yaml'
+    file.write_text('/**: {ros__parameters: {control_rate: 100.0}}', encoding='utf-8')
+    return str(file)
+
+
 def test_a_record_is_gone_on_with_and_changes_nothing(tmp_path: Path) -> None:
     cases = random_cases(Namespace(random=2, seed=1, gaits=['trot'], speeds=[0.3], legs=['auto'],
                                    braking=[4.0], no_resume=True))
-    record = tmp_path / 'record'
-    first = run_cases(cases[:1], None, Workers(1), record)
-    both = run_cases(cases, None, Workers(1), record)
-    assert str(both) == str(run_cases(cases, None, Workers(2))) and str(both[:1]) == str(first)
+    record, file = tmp_path / 'record', slower(tmp_path)
+    first = run_cases(cases[:1], file, Workers(1), record)
+    both = run_cases(cases, file, Workers(1), record)
+    assert str(both) == str(run_cases(cases, file, Workers(2))) and str(both[:1]) == str(first)
     lines = record.read_text(encoding='utf-8').splitlines()
     assert len(lines) == 2
     assert not any(outcome.broken for _, outcome in both)
     record.write_text(f'{lines[0]}\n{lines[1][:40]}', encoding='utf-8')  # interrupted
-    assert str(run_cases(cases, None, Workers(1), record)) == str(both)
+    assert str(run_cases(cases, file, Workers(1), record)) == str(both)
     assert record.read_text(encoding='utf-8').splitlines() == lines
     for others, why in ((cases[1:], 'line 1, is of another stop'), (cases, 'is no recorded stop')):
         with pytest.raises(DataError, match=why):
-            run_cases(others, None, Workers(1), record)
+            run_cases(others, file, Workers(1), record)
         record.write_text('{"fell": false}\n', encoding='utf-8')
 
 
@@ -230,8 +237,8 @@ def test_the_command_prints_a_row_per_method_and_writes_its_numbers_and_every_ca
     written, printed = [], []
     for jobs in ('1', '2'):
         file, record = tmp_path / f'{jobs}.json', tmp_path / f'{jobs}.jsonl'
-        assert main(['--phases', '1', '--speeds', '0.3', '--gaits', 'trot', '--jobs', jobs,
-                     '--quiet', '--json', str(file), '--record', str(record)]) == 0
+        assert main([slower(tmp_path), '--phases', '1', '--speeds', '0.3', '--gaits', 'trot',
+                     '--jobs', jobs, '--quiet', '--json', str(file), '--record', str(record)]) == 0
         (line,) = record.read_text(encoding='utf-8').splitlines()
         of = json.loads(line)
         assert of['case']['gait'] == 'trot' and of['outcome']['standing']
