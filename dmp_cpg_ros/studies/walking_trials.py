@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from math import hypot, isnan, nan, pi
 from typing import Any, NamedTuple
 
@@ -120,6 +121,7 @@ class SteadyOutcome:
     without_losses: float = nan
 
 
+@cache
 def is_there(file: str) -> bool:
     """Whether a robot's file and its model are installed."""
     try:
