@@ -63,14 +63,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given and not given[0].startswith('-'):
         sys.argv = given
         return run(given[0])
+    try:
+        print('\n'.join(_listing()), flush=True)
+    except BrokenPipeError:  # as in dmp_cpg_ros | head
+        from dmp_cpg_ros.commands.ending_signals import leave_output
+        from dmp_cpg_ros.commands.ros_arguments import UNREAD
+
+        leave_output()
+        return UNREAD
+    return BAD_INPUT if given and given[0] not in ('-h', '--help') else 0
+
+
+def _listing() -> Iterator[str]:
+    """What is printed without a name: how to begin, and what there is."""
     from dmp_cpg_ros.suite_table import KINDS
 
-    print('usage: dmp_cpg_ros NAME [...], or NAME [...] alone; NAME --help says more; --version')
+    yield 'usage: dmp_cpg_ros NAME [...], or NAME [...] alone; NAME --help says more; --version'
+    yield 'to begin: dmp_cpg_ros walk --view, and open the address that it prints in a browser'
     for title, names in (('commands', COMMANDS), ('studies', STUDIES), ('nodes', tuple(KINDS))):
-        print(f'\n{title}:')
+        yield f'\n{title}:'
         for name in names:
-            print(f'  {name:22}{_summary(name)}')
-    return BAD_INPUT if given and given[0] not in ('-h', '--help') else 0
+            yield f'  {name:22}{_summary(name)}'
 
 
 def run(name: str) -> int:

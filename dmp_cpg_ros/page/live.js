@@ -126,6 +126,7 @@ function show() {
   find('clock').textContent = `${frame.time.toFixed(1)} s`;
   find('pace').textContent = `${frame.pace.toFixed(2)} × real time · ${Math.round(frame.pace * scene.rate)} Hz`;
   find('pace').classList.toggle('slow', frame.pace < 0.95);
+  find('slow').hidden = frame.pace > 0.75;
   find('state').textContent = state;
   find('why').textContent = frame.requested && stop.automatic === 'true' ? 'or drive' : 'start it again';
   find('inhibit').classList.toggle('idle', Boolean(frame.requested && stop.automatic !== 'true'));

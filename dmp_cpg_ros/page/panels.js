@@ -30,6 +30,11 @@ function disc(ink, x, y, radius, fill, stroke) {
   if (stroke) { ink.strokeStyle = stroke; ink.stroke(); }
 }
 
+/** A number as text; none is -0.00. */
+function digits(value, count = 2) {
+  return (Math.abs(value) < 0.5 * 10 ** -count ? 0 : value).toFixed(count);
+}
+
 function write(ink, text, x, y, colour = DIM, align = 'left') {
   ink.fillStyle = colour;
   ink.textAlign = align;
@@ -225,8 +230,8 @@ export class Speeds {
     write(ink, '0', 0, y(0) - 6);
     write(ink, `${SECONDS} s`, width, y(0) - 6, DIM, 'right');
     ink.font = `12px ${FONT}`;
-    write(ink, `reference ${(frame.reference || [0])[0].toFixed(2)} m/s`, 0, 8, '#5aa9f5');
-    write(ink, `body ${frame.speed[0].toFixed(2)} m/s, ${frame.speed[2].toFixed(2)} rad/s`, width, 8, TEXT, 'right');
+    write(ink, `reference ${digits((frame.reference || [0])[0])} m/s`, 0, 8, '#5aa9f5');
+    write(ink, `body ${digits(frame.speed[0])} m/s, ${digits(frame.speed[2])} rad/s`, width, 8, TEXT, 'right');
   }
 }
 

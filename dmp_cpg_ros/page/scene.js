@@ -7,7 +7,8 @@ import { COLOURS } from '/panels.js';
 const FIELD = 0.62;               // field of view, half its height [rad / 2]
 const SHADOW = 1024;              // texels along a side of the shadow map
 const FOOTPRINTS = 60;
-const SLOW = 0.12;                // time between pictures that is too long [s]
+const SLOW = 0.12;                // time between pictures that is too long [s],
+const LATE = 1;                   // and sum of such times, one after the other, that is too much [s]
 const SKY = [0.42, 0.60, 0.82], HORIZON = [0.83, 0.89, 0.94];
 const SUN = normal([-0.45, -0.35, 1.0]);
 
@@ -322,8 +323,8 @@ export class View {
   /** Draw fewer points where pictures take long: without a graphics processor, for instance. */
   _spare(dt) {
     if (this.width !== this.canvas.clientWidth) [this.quality, this.late, this.width] = [1, 0, this.canvas.clientWidth];
-    this.late = dt > SLOW ? this.late + 1 : 0;
-    if (this.late > 8 && this.quality > 0.4) [this.quality, this.late] = [this.quality * 0.7, 0];
+    this.late = dt > SLOW ? this.late + dt : 0;
+    if (this.late > LATE && this.quality > 0.4) [this.quality, this.late] = [this.quality * 0.7, 0];
   }
 
   /** Where on the robot a point of the canvas is, as a ray hits it; null beside the robot. */

@@ -539,10 +539,32 @@ def test_the_picture_shows_a_robot_and_the_panels_are_drawn(client: Client, page
     assert not page.problems
 
 
-def test_on_a_telephone_nothing_sticks_out(client: Client, page: Page) -> None:
-    page.open(client.address, 390, 800, scale=2, touch=True)
+TOUCHED = ('#inhibit', '#resume', '#stick')
+"""What a hand needs while the robot walks."""
+
+
+@pytest.mark.parametrize(('width', 'height'), [(390, 800), (360, 640), (800, 390), (740, 360)])
+def test_on_a_telephone_nothing_sticks_out_and_the_stick_is_beside_the_stop(
+        client: Client, page: Page, width: int, height: int) -> None:
+    page.open(client.address, width, height, scale=2, touch=True)
     page.until(state('at rest'))
-    assert page.evaluate('document.documentElement.scrollWidth') <= 390
+    assert page.evaluate('document.documentElement.scrollWidth') <= width
+    # The longest texts that the picture has, before the next frame writes others.
+    boxes = page.evaluate(
+        "['clock', 'pace', 'force'].forEach((name, i) => { document.getElementById(name)"
+        ".textContent = ['3599.9 s', '0.52 × real time · 130 Hz', 'push 130 N'][i]; }); "
+        f"[...document.querySelectorAll('header.hud > *:not(.spring), {', '.join(TOUCHED)}')].map("
+        '(each) => each.getBoundingClientRect()).map((at) => '
+        '[at.left, at.top, at.right, at.bottom])')
+    boxes = [box for box in boxes if box[2] > box[0]]
+    assert len(boxes) >= 4 + len(TOUCHED)
+    assert all(0 <= left and 0 <= top and right <= width and bottom <= height
+               for left, top, right, bottom in boxes), boxes
+    seen = page.evaluate("['clientWidth', 'clientHeight'].map((name) => "
+                         "document.querySelector('#scene')[name])")
+    assert seen[0] * seen[1] > 0.35 * width * height, seen
+    for hint in ('Drag the robot to push it', 'turn the view'):
+        assert hint in page.evaluate("document.querySelector('.hint').innerText")
     assert not page.problems
 
 

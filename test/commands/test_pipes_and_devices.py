@@ -140,9 +140,10 @@ def command(*arguments: object, **environment: str) -> subprocess.Popen[str]:
         stderr=subprocess.PIPE, text=True, env={**os.environ, **environment})
 
 
-def test_who_reads_no_further_ends_a_command_quietly() -> None:
+@pytest.mark.parametrize('name', [(), ('--help',), ('certify',)])
+def test_who_reads_no_further_ends_a_command_quietly(name: Sequence[str]) -> None:
     """As ``certify | head``."""
-    with command('certify') as process:
+    with command(*name) as process:
         assert process.stdout is not None and process.stderr is not None
         process.stdout.close()
         assert (process.wait(60.0), process.stderr.read()) == (141, '')
