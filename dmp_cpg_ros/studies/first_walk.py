@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Seconds from one line of a terminal to a robot that walks in a browser, and stops.
 
-Runs ``walk --view`` as it is installed here and, of a wheel, ``uvx --from 'WHEEL[ros]'
-dmp_cpg_ros walk --view``, which makes an environment of its own; round after round, so that the
+Runs ``walk --view`` as it is installed here and, of a wheel, by the lines of ``doc/index.md``
+with ``uvx`` and ``pipx``, which make an environment of their own; round after round, so that the
 first one shows what it takes with the caches as they are. What a browser asks is asked: the page,
 the picture, a start, a velocity, a push, a stop. Exit status 1 when the robot fell, or did not
 stop within its bound.
@@ -16,6 +16,8 @@ import http.client
 import json
 import os
 import re
+import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -38,6 +40,14 @@ from dmp_cpg_ros.studies.output import at_least_one, parser_of, write_results
 
 ADDRESS = r'live view: (http://127\.0\.0\.1:\d+/\?token=\S+)'
 """What names the page."""
+
+LINES = {'uvx': "uvx --from 'WHEEL[ros]' dmp_cpg_ros walk --view",
+         'pipx': "pipx run --spec 'WHEEL[ros]' dmp_cpg_ros walk --view"}
+"""What a newcomer types who has a wheel, by the program that makes the environment."""
+
+OF_THIS_PYTHON = ('PYTHONPATH', 'LD_LIBRARY_PATH', 'VIRTUAL_ENV', 'AMENT_PREFIX_PATH',
+                  'ROS_DISTRO', '_ROS_WHEELS_BOOTSTRAP_COMPLETE')
+"""Variables that would lead what is installed elsewhere to the packages here."""
 
 PATIENCE_S = 300.0
 """How long each step may take, an environment that is made among them [s]."""
@@ -140,7 +150,7 @@ class FirstWalk:
         """Start it; what is installed elsewhere hears nothing of the packages here."""
         self._begin, self._said = time.monotonic(), ''
         self._known = threading.Event()
-        own = () if command[0] == sys.executable else ('PYTHONPATH', 'VIRTUAL_ENV')
+        own = () if command[0] == sys.executable else OF_THIS_PYTHON
         self._process = subprocess.Popen(
             command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
             start_new_session=True, preexec_fn=partial(end_with_parent, signal.SIGINT),
@@ -233,22 +243,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = parser_of('first_walk', __doc__, 'what was measured', jobs=False)
     add = parser.add_argument
     add('--wheel', type=Path, metavar='FILE',
-        help='also by uvx, of this wheel (pip wheel --no-deps . makes one); needs uv')
-    add('--uvx', nargs='+', default=['uvx'], metavar='WORD', help='(default: uvx)')
+        help='also of this wheel (pip wheel --no-deps . makes one); needs uv or pipx')
+    add('--by', nargs='+', choices=LINES, default=['uvx'], help='what runs it (default: uvx)')
     add('--rounds', type=at_least_one, default=3, metavar='N', help='of each way (default: 3)')
     return run_command(parser, arguments, _main)
 
 
 def _main(options: argparse.Namespace, _: RosArguments) -> int:
-    ways = {'installed: `walk --view`': [sys.executable, '-m', 'dmp_cpg_ros']}
+    ways = {'installed: `walk --view`': [sys.executable, '-m', 'dmp_cpg_ros', 'walk', '--view']}
     if options.wheel:
-        ways["`uvx --from 'WHEEL[ros]' dmp_cpg_ros walk --view`"] = [
-            *options.uvx, '--from', f'{options.wheel.resolve()}[ros]', 'dmp_cpg_ros']
+        ways |= {f'`{LINES[name]}`': typed(LINES[name], options.wheel) for name in options.by}
     results = []
     for way, command in ways.items():
         for number in range(options.rounds):
             with TemporaryDirectory() as folder:
-                walk = FirstWalk([*command, 'walk', '--view', '--no-report'], Path(folder))
+                walk = FirstWalk([*command, '--no-report'], Path(folder))
                 try:
                     results.append({'way': way, 'round': number + 1} | walk.measure())
                 finally:
@@ -257,6 +266,21 @@ def _main(options: argparse.Namespace, _: RosArguments) -> int:
     print('\n' + table(results))
     write_results(options.json, results)
     return int(not all(map(as_promised, results)))
+
+
+def typed(line: str, wheel: Path) -> list[str]:
+    """Words of a line with a wheel in it.
+
+    Raises
+    ------
+    DmpCpgError
+        If there is no such program.
+    """
+    name, *words = shlex.split(line)
+    program = shutil.which(name)
+    if program is None:
+        raise DmpCpgError(f'there is no {name} on the PATH')
+    return [program, *(word.replace('WHEEL', str(wheel.resolve())) for word in words)]
 
 
 def as_promised(result: dict[str, Any]) -> bool:

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tarfile
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
 from importlib import import_module
 from importlib.metadata import distributions
 from pathlib import Path
@@ -25,6 +26,13 @@ import dmp_cpg_ros
 from dmp_cpg_ros.__main__ import ON_THE_INDEX
 from dmp_cpg_ros.commands.debian_package import control, debian_package
 from dmp_cpg_ros.strict_yaml import load_yaml
+from dmp_cpg_ros.studies.first_walk import (
+    LINES,
+    OF_THIS_PYTHON,
+    FirstWalk,
+    as_promised,
+    typed,
+)
 from dmp_cpg_ros.suite_table import KINDS
 
 CONTRACT = ('reference_filter', 'canonical_oscillators', 'leg_transformation', 'inhibition',
@@ -464,40 +472,75 @@ events:
 """
 
 
-@pytest.mark.skipif('FRESH_INSTALL' not in os.environ,
-                    reason='installs 0.7 GB, which takes minutes: make test-install')
-def test_a_fresh_environment_with_the_extra_ros_alone_walks_and_reports(
-        checkout: Path, tmp_path: Path) -> None:
+fetched = pytest.mark.skipif('FRESH_INSTALL' not in os.environ,
+                             reason='installs 0.7 GB, which takes minutes: make test-install')
+
+
+def ran(folder: Path, *command: str, **more: str) -> subprocess.CompletedProcess[str]:
+    """Run a command of another environment, which knows nothing of this one."""
+    clean = {name: value for name, value in os.environ.items() if name not in OF_THIS_PYTHON}
+    return subprocess.run(command, cwd=folder, env={**clean, **more}, check=False,
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+@pytest.fixture
+def fresh(tmp_path: Path) -> Iterator[Path]:
+    """Executables of an environment with nothing in it, where the wheels of ROS can be had."""
     pytest.importorskip('rclpy')
-    from ros_processes import reserved_domain
-
-    own = ('PYTHONPATH', 'LD_LIBRARY_PATH', 'VIRTUAL_ENV', 'AMENT_PREFIX_PATH', 'ROS_DISTRO',
-           '_ROS_WHEELS_BOOTSTRAP_COMPLETE')
-    clean = {name: value for name, value in os.environ.items() if name not in own}
-
-    def run(*command: str, **more: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(command, cwd=tmp_path, env={**clean, **more}, check=False,
-                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-
-    fresh = tmp_path / 'fresh' / 'bin'
-    made = run(sys.executable, '-m', 'venv', str(fresh.parent))
+    bin_ = tmp_path / 'fresh' / 'bin'
+    made = ran(tmp_path, sys.executable, '-m', 'venv', str(bin_.parent))
     assert made.returncode == 0, made.stdout
-    pip = (str(fresh / 'python'), '-m', 'pip', '--quiet', 'install')
-    asked = run(*pip, '--dry-run', '--no-deps', 'ros-jazzy-rclpy')
+    asked = ran(tmp_path, str(bin_ / 'pip'), '--quiet', 'install', '--dry-run', '--no-deps',
+                'ros-jazzy-rclpy')
     if asked.returncode != 0:
         pytest.skip(f'no package index has the wheels of ROS for this machine: {asked.stdout}')
-    got = run(*pip, '--constraint', str(ROOT / 'constraints.txt'),
-              f'{built(checkout, "wheel")}[ros]')
+    yield bin_
+    for folder in tmp_path.iterdir():  # pytest keeps folders of the last runs
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@fetched
+def test_a_fresh_environment_with_the_extra_ros_alone_walks_and_reports(
+        fresh: Path, checkout: Path, tmp_path: Path) -> None:
+    got = ran(tmp_path, str(fresh / 'pip'), '--quiet', 'install', '--constraint',
+              str(ROOT / 'constraints.txt'), f'{built(checkout, "wheel")}[ros]')
     assert got.returncode == 0, got.stdout
     (tmp_path / 'short.yaml').write_text(SHORT_WALK, encoding='utf-8')
     with reserved_domain() as domain:
-        walk = run(str(fresh / 'walk'), 'short.yaml', '--lock-step', '--view', '--out', 'run',
-                   ROS_DOMAIN_ID=str(domain))
+        walk = ran(tmp_path, str(fresh / 'walk'), 'short.yaml', '--lock-step', '--view', '--out',
+                   'run', ROS_DOMAIN_ID=str(domain))
     assert walk.returncode == 0, walk.stdout
     assert 'live view: http://127.0.0.1:' in walk.stdout, walk.stdout
     assert '[ok] Every stop came to rest: 1 of 1' in walk.stdout, walk.stdout
     assert (tmp_path / 'run' / 'report.html').is_file(), walk.stdout
-    shutil.rmtree(fresh.parent)  # pytest keeps folders of the last runs
+
+
+@fetched
+@pytest.mark.parametrize(('name', 'package', 'home'), [
+    ('uvx', 'uv', 'UV_CACHE_DIR'), ('pipx', 'pipx', 'PIPX_HOME')])
+def test_one_line_without_an_installation_serves_a_robot_that_walks_and_stops(
+        name: str, package: str, home: str, fresh: Path, checkout: Path, tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """The line of the documents, typed by somebody who has a wheel and nothing else."""
+    got = ran(tmp_path, str(fresh / 'pip'), '--quiet', 'install', package)
+    if got.returncode != 0:
+        pytest.skip(f'no package index has {package}: {got.stdout}')
+    (line,) = (line for line in (ROOT / 'doc' / 'index.md').read_text('utf-8').splitlines()
+               if line.startswith(f'{name} '))
+    assert line == LINES[name]
+    monkeypatch.setenv('PATH', f'{fresh}{os.pathsep}{os.environ["PATH"]}')
+    monkeypatch.setenv(home, str(tmp_path / 'home'))
+    words = typed(line, built(checkout, 'wheel'))
+    where = words.index(PACKAGE)
+    told = ran(tmp_path, *words[:where + 1])  # which fills the cache
+    assert told.returncode == 0 and 'to begin: dmp_cpg_ros walk --view' in told.stdout, told.stdout
+    with reserved_domain() as domain:
+        monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+        walk = FirstWalk([*words, '--no-report', '--composed', '--rate', '100'], tmp_path)
+        try:
+            assert as_promised(walk.measure())
+        finally:
+            walk.end()
 
 
 @installed
