@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from itertools import product
@@ -57,12 +58,15 @@ class Case:
 
 
 @lru_cache(maxsize=1)
-def grid() -> tuple[Case, ...]:
-    """The whole grid."""
-    rng = np.random.default_rng(4)
-    return tuple(grid_case(*values, rng) for values in product(
-        GRAPHS, ('amble', 'trot', 'bound'), (10.0, 25.0, 60.0, 200.0), (0.65, 0.95, 1.15, 2.0),
-        (0.15, 0.35), ('fl', 'rr'), (3.0, 9.0)))
+def grid(tell: Callable[[str], None] = lambda _: None) -> tuple[Case, ...]:
+    """The whole grid; says how far it is."""
+    rng, cases = np.random.default_rng(4), list[Case]()
+    for values in (every := list(product(
+            GRAPHS, ('amble', 'trot', 'bound'), (10.0, 25.0, 60.0, 200.0),
+            (0.65, 0.95, 1.15, 2.0), (0.15, 0.35), ('fl', 'rr'), (3.0, 9.0)))):
+        cases.append(grid_case(*values, rng))
+        tell(f'{len(cases)} of {len(every)} settings')
+    return tuple(cases)
 
 
 def grid_case(graph: str, gait: str, gain: float, share: float, region: float, leg: str,

@@ -10,6 +10,7 @@ from math import ceil, log2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.maths import Array
 
@@ -28,6 +29,11 @@ class Setting:
     def node(self) -> int:
         """The inhibited oscillator."""
         return int(np.argmax(self.gains))
+
+
+def locked(setting: Setting, phi: float, radius: float = 1.0) -> Array:
+    """All oscillators in their places at phase φ, radii as a share of r."""
+    return state_at(phi + setting.system.graph.phases, radius * setting.system.radius)
 
 
 class Batch:

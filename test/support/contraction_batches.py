@@ -12,14 +12,9 @@ from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.studies.certificate_settings import GRAPHS
 from dmp_cpg_ros.studies.draws import random_edges
-from dmp_cpg_ros.studies.network_batch import Batch, Setting
+from dmp_cpg_ros.studies.network_batch import Batch, Setting, locked
 
 __all__ = ['Batch', 'Setting', 'locked', 'random_graph', 'random_setting']
-
-
-def locked(setting: Setting, phi: float, radius: float = 1.0) -> np.ndarray:
-    """All oscillators in their places at phase φ, radii as a share of r."""
-    return state_at(phi + setting.system.graph.phases, radius * setting.system.radius)
 
 
 def random_graph(name: str, size: int, gain: float, rng: np.random.Generator) -> CouplingGraph:

@@ -20,7 +20,7 @@ import headlines_of_bodies as bodies
 import headlines_of_faults as faults
 from checkout import ROOT
 
-from dmp_cpg_ros.studies import first_walk
+from dmp_cpg_ros.studies import certified_grid, first_walk
 from dmp_cpg_ros.studies.random_stops import ROUGHNESS
 from dmp_cpg_ros.studies.study_stops import table
 from dmp_cpg_ros.studies.walking_trials import relative_error
@@ -259,6 +259,15 @@ def tightness(rows: Any) -> str:
             f'{span("contraction", "contraction" + slow, digits=1)} in a constant norm')
 
 
+def settings(rows: Any) -> str:
+    """Of ``certified_grid``."""
+    of, tried = (sum(row[name] for row in rows) for name in ('certified', 'settings'))
+    wrong = sum(row['certified'] - min(row['synchronise'], row['stop']) + row['keep'][1]
+                - row['keep'][0] for row in rows)
+    return (f'{of} of {tried:,} settings certified; '
+            f'{f"{wrong} of them fail" if wrong else "none of them fails"} in simulation')
+
+
 def ratio(row: Any) -> float:
     """How much more a certificate asks for than what works."""
     return max(row['certified'] / row['works'], row['works'] / row['certified'])
@@ -413,6 +422,15 @@ def tightness_rows(rows: Any) -> list[str]:
             for name, condition in TIGHTNESS.items()]
 
 
+def setting_rows(rows: Any) -> list[str]:
+    """Rows of the table of certified settings, and its sums."""
+    misread, loose = ([sum(counts) for counts in zip(*(row[name] for row in rows), strict=True)]
+                      for name in ('misread', 'loose'))
+    return [*(f'| {" | ".join(certified_grid.cells(row))} |' for row in rows),
+            f'with the eigenvalue misread {misread[1]} of {misread[0]} drift apart, and of '
+            f'{loose[0]} that contract without capture {loose[1]} walk on']
+
+
 def delay_rows(rows: Any) -> list[str]:
     """Rows of the table of delays: a kind, gaits or random networks, and what was certified of the
     smallest age that fails; no number stands for any age, and for none.
@@ -485,6 +503,7 @@ STUDIES = {
     'any-command': Study(any_command, command_rows, 'doc/walking.md'),
     'stairs-what-one-foot-felt-all-know': Study(stairs, stair_rows, 'doc/walking.md'),
     'tightness-of-the-certificates': Study(tightness, tightness_rows),
+    'no-certified-setting-fails': Study(settings, setting_rows),
     'what-is-certified-over-what-fails': Study(None, delay_rows, 'doc/certificate.md'),
     'falls': Study(falls, fall_rows), 'stops-at-every-phase': Study(stops, stop_rows),
     'brisk-stops': Study(brisk_stops, brisk_rows, 'doc/walking.md'),
