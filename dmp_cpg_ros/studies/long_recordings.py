@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from dmp_cpg_ros.analysis.bag import STORE, find_bag, opened, recorded
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import run_command
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of, write_results
 
@@ -54,8 +55,9 @@ def repeated(run: Path, folder: Path, minutes: int) -> int:
                    if STORE.fielddefs[kind][1][0][0] in STAMPED}
         first, last = source[0][1], source[-1][1]
         period = last - first + 4_000_000
-        count = 0
+        count, tell = 0, Progress()
         for offset in range(0, minutes * 60 * SECOND, period):
+            tell(f'{offset / SECOND / 60.0:.1f} of {minutes} minutes are written')
             for connection, bag_ns, raw in source:
                 if bag_ns - first + offset >= minutes * 60 * SECOND:
                     break

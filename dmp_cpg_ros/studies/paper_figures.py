@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,12 +24,14 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.figures.gait import canonical_states, target_kinematics
 from dmp_cpg_ros.analysis.recording import Array, Recording
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.loop import WalkingLoop
+from dmp_cpg_ros.core.loop import Tick, WalkingLoop
+from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.files import writable
 from dmp_cpg_ros.paper.network import EdgeCoupling, OscillatorNetwork
@@ -315,7 +317,7 @@ def figures(suite: Suite) -> Iterator[tuple[str, Figure]]:
     yield 'gait', gait_figure(suite.gait, suite.gait.duty(SPEED, scale))
     context = RunContext(robot.description, suite.gait, suite.parameters.inhibition,
                          suite.parameters.canonical.radius)
-    recording = experiment(suite, robot)
+    recording = experiment(suite, robot, Progress())
     for draw in (target_kinematics, canonical_states):
         figure = draw(recording, context)
         if figure is not None:
@@ -324,16 +326,18 @@ def figures(suite: Suite) -> Iterator[tuple[str, Figure]]:
         local_dynamics(False), local_dynamics(True))
 
 
-def experiment(suite: Suite, robot: MujocoRobot) -> Recording:
-    """Amble, inhibit, release: the paper's experiment in the plain loop."""
+def experiment(suite: Suite, robot: MujocoRobot,
+               tell: Callable[[str], None] = lambda _: None) -> Recording:
+    """Amble, inhibit, release: the paper's experiment in the plain loop; says how far it is."""
     loop, state = WalkingLoop(robot.description, suite.gait, suite.parameters), robot.reset()
     loop.command(SPEED)
-    states, ticks = [], []
+    states, ticks = list[RobotState](), list[Tick]()
     for stopped, seconds in ((None, INHIBITED_AT), (True, RELEASED_AT - INHIBITED_AT),
                              (False, END - RELEASED_AT)):
         if stopped is not None:
             loop.request(stopped)
         for _ in range(round(seconds * 1e9 / suite.tick_ns)):
+            tell(f'walked {1e-9 * suite.tick_ns * len(states):.0f} of {END:g} s')
             states.append(state)
             ticks.append(loop.tick(state))
             state = robot.step(ticks[-1].targets)

@@ -23,6 +23,7 @@ from functools import partial
 import numpy as np
 
 from dmp_cpg_ros.analysis.strict_json import to_json
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.errors import ParameterError
@@ -54,8 +55,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add('--every', type=int, default=1, metavar='N', help='of the grid, every N-th only; 0: none')
     add('--seed', type=int, default=1, help='of the random settings and of what is spoiled')
     options = parser.parse_args(arguments)
-    with Workers(options.workers, progress=False) as workers:
-        cases = [case.running for case in grid()[::options.every]] if options.every else []
+    with Workers(options.workers) as workers:
+        every = grid(Progress('grid: '))[::options.every] if options.every else ()
+        cases = [case.running for case in every]
         found, drawn = list(workers.map(attempt, cases, 8)), list[tuple[bool, str]]()
         wrong = _told('grid', found)
         while sum(certified for certified, _ in drawn) < options.random:
@@ -64,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         wrong += _told('random', drawn)
     texts = [text for _, text in (*found, *drawn) if text]
     counts: Counter[tuple[str, str]] = Counter()
-    with Workers(options.workers, progress=False, prepare=partial(_keep, texts)) as workers:
+    with Workers(options.workers, prepare=partial(_keep, texts)) as workers:
         false = [names for names in workers.map(_refuted, texts, 20) if names]
         print(f'claims of the {len(texts)} proofs that are refuted: {false or "none"}\n',
               flush=True)

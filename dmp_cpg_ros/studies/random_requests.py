@@ -26,6 +26,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.commands.suite_domain import alone_in_domain
 from dmp_cpg_ros.configuration import ROBOTS, find_config
@@ -79,6 +80,7 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
         for case in cases:
             case['end'] = [REST, True]
     size = 2 if options.beside else 1
+    tell = Progress(every_s=10.0)
     with alone_in_domain(''):
         for pair in (cases[k:k + size] for k in range(0, len(cases), size)):
             outcomes = [_walked(case, options.logs and options.logs / str(case['seed']))
@@ -97,6 +99,7 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
                     least = _smallest(case, walked.wrong[0])
                     print(f'seed {case["seed"]}, smallest: {least}', flush=True)
                 results.append(_result(case, walked))
+            tell(f'{len(results)} of {len(cases)} sequences')
             write_results(options.json, results)
     print(markdown_table(('robot', 'sequences', 'requests', 'granted', *LOOKED_AT, 'wrong'),
                          list(_rows(results))))

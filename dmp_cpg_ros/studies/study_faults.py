@@ -20,7 +20,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from itertools import cycle, islice
@@ -32,6 +32,7 @@ import numpy as np
 from dmp_cpg_ros.analysis.bag import base_name, opened, recorded
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import tilt
+from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
@@ -123,13 +124,16 @@ class Outcome:
 
 
 def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence[str],
-        rng: random.Random, folder: Path) -> Outcome:
-    """Walk, and kill some nodes one after the other."""
+        rng: random.Random, folder: Path, tell: Callable[[str], None] = lambda _: None) -> Outcome:
+    """Walk, and kill some nodes one after the other; says how far it is."""
+    way = gait + ', lock-step' * lock_step
+    tell(f'{way}: starts')
     walk = WalkProcess.of(folder, 3600.0, ahead(speed), *['--lock-step'] * lock_step,
                           *['--respawn'] * respawn, gait=gait)
     outcome = Outcome(gait, lock_step, respawn)
     going = walk.said('walking') < inf
-    for node in nodes if going else ():
+    for number, node in enumerate(nodes if going else ()):
+        tell(f'{way}: {number} of {len(nodes)} kills')
         time.sleep(rng.uniform(2.0, 8.0))
         begin, pid = len(walk.lines), walk.pid_of([node])
         if not pid:
@@ -236,6 +240,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _main(options: argparse.Namespace, ros: RosArguments) -> int:
     rng, outcomes = random.Random(options.seed), list[Outcome]()
+    tell = Progress(every_s=10.0)
     for round_ in range(options.rounds):
         for respawn in options.respawn:
             for lock_step in options.lock_step:
@@ -248,7 +253,8 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
                         wanted = [rng.choice(nodes)]
                     with folder_of_logs(options.logs and (
                             options.logs / f'{len(outcomes):03}_{gait}')) as folder:
-                        outcomes.append(run(gait, speed, lock_step, respawn, wanted, rng, folder))
+                        outcomes.append(run(
+                            gait, speed, lock_step, respawn, wanted, rng, folder, tell))
                     print(f'round {round_}: {json.dumps(asdict(outcomes[-1]))}', flush=True)
                     write_results(options.json, [asdict(one) for one in outcomes])
     print(markdown_table(COLUMNS, list(rows(outcomes))))
