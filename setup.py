@@ -73,6 +73,15 @@ def wrappers() -> list[str]:
     return [str(folder / executable) for executable in EXECUTABLES]
 
 
+def scratch() -> dict[str, dict[str, str]]:
+    """Build a wheel in a folder that goes: what an older one left in ``build`` would be packed."""
+    if 'bdist_wheel' not in sys.argv:
+        return {}
+    folder = tempfile.mkdtemp(prefix=NAME)
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return {'build': {'build_base': folder}}
+
+
 def shared_files() -> list[tuple[str, list[str]]]:
     """Every file of config/ and launch/ with the folder under share/ that keeps its place."""
     by_folder: dict[str, list[str]] = {}
@@ -99,6 +108,7 @@ setup(
     description='CPG-based quadruped walking with coupled rhythmic movement primitives',
     license='Apache-2.0',
     **maintainer(),
+    options=scratch(),
     python_requires='>=3.10',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={NAME: package_data()},

@@ -31,7 +31,7 @@ function disc(ink, x, y, radius, fill, stroke) {
 }
 
 /** A number as text; none is -0.00. */
-function digits(value, count = 2) {
+function rounded(value, count = 2) {
   return (Math.abs(value) < 0.5 * 10 ** -count ? 0 : value).toFixed(count);
 }
 
@@ -230,8 +230,8 @@ export class Speeds {
     write(ink, '0', 0, y(0) - 6);
     write(ink, `${SECONDS} s`, width, y(0) - 6, DIM, 'right');
     ink.font = `12px ${FONT}`;
-    write(ink, `reference ${digits((frame.reference || [0])[0])} m/s`, 0, 8, '#5aa9f5');
-    write(ink, `body ${digits(frame.speed[0])} m/s, ${digits(frame.speed[2])} rad/s`, width, 8, TEXT, 'right');
+    write(ink, `reference ${rounded((frame.reference || [0])[0])} m/s`, 0, 8, '#5aa9f5');
+    write(ink, `body ${rounded(frame.speed[0])} m/s, ${rounded(frame.speed[2])} rad/s`, width, 8, TEXT, 'right');
   }
 }
 

@@ -424,6 +424,15 @@ def test_a_wheel_has_the_same_files_from_the_checkout_as_from_an_sdist(
     assert shared | scripts | modules_ <= names
 
 
+def test_a_wheel_has_nothing_that_an_older_one_left(checkout: Path) -> None:
+    left = checkout / 'build' / 'lib' / PACKAGE / 'gone.py'
+    left.parent.mkdir(parents=True)
+    left.touch()
+    with ZipFile(built(checkout, 'wheel')) as wheel:
+        names = wheel.namelist()
+    assert f'{PACKAGE}/__init__.py' in names and f'{PACKAGE}/{left.name}' not in names
+
+
 @pytest.fixture
 def colcon(tmp_path: Path) -> str:
     """The command; where it may be fetched, in an environment of its own, for it wants another
