@@ -29,7 +29,7 @@ COMMANDS = ('walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_clien
 STUDIES = ('study_stops', 'benchmark_walking', 'study_recovery')
 """Executables that are no nodes; those that are stand in :mod:`dmp_cpg_ros.suite_table`."""
 
-BAD_INPUT, INTERRUPTED = 2, 130
+BAD_INPUT, INTERRUPTED, UNREAD = 2, 130, 128 + 13
 """Exit statuses."""
 
 ON_THE_INDEX = {
@@ -66,10 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         print('\n'.join(_listing()), flush=True)
     except BrokenPipeError:  # as in dmp_cpg_ros | head
-        from dmp_cpg_ros.commands.ending_signals import leave_output
-        from dmp_cpg_ros.commands.ros_arguments import UNREAD
-
-        leave_output()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return UNREAD
     return BAD_INPUT if given and given[0] not in ('-h', '--help') else 0
 

@@ -220,10 +220,9 @@ class PostureController:
         return memory, PostureFeedback(
             self._torque(body, legs, feet, stride, planned, self._bounce(gait, stride),
                          acceleration, terrain.empty),
-            self._shift(stride, gait, plan.expected, measured, planned,
-                        turned_back(beside, under, R_ground_base[2], self.model.height,
-                                    terrain.rough),
-                        across, R_ground_base, level if terrain.barred else LEVEL_FEET),
+            self._shift(stride, gait, plan.expected, measured, planned, turned_back(
+                beside, under, R_ground_base[2], self.model.height, terrain.rough),
+                across, R_ground_base, level if terrain.barred else LEVEL_FEET),
             np.array(self.placement.drift(
                 self.placement.yielding(p, stride.reference[0], gait.firm, plan.acceleration),
                 measured, planned, stride.activity.tolist(), sway.velocity)),
