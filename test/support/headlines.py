@@ -123,7 +123,7 @@ def brisk_stops(rows: Sequence[dict[str, str]]) -> str:
 def body_stops(of: Any) -> str:
     """Of ``study_stops --random``."""
     told = 'none of the others stood' if not of['late'] + of['far'] else (
-        f'of the others {of["late"]} stood later and {of["far"]} farther on,')
+        f'of the others {of["late"]} stood later and {of["far"]} farther on')
     below = f', in another one below {100.0 * of["below"]["1e-06"]:.2g} % at confidence ' \
         '1 − 10⁻⁶' if of['below'] else ''
     later = ' later or farther on' if told.endswith('stood') else ''
