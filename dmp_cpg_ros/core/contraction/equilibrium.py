@@ -119,8 +119,8 @@ def equilibrium_up_to(system: CanonicalSystem, omega: float | Array, gains: Arra
 
 
 def described(system: CanonicalSystem, x: Array, omega: float | Array, gains: Array
-               ) -> InhibitedEquilibrium:
-    """Everything about an equilibrium x."""
+              ) -> InhibitedEquilibrium:
+    """Everything about an equilibrium x (N, 2) at ω [rad/s] under gains (N,) [1/s]."""
     rates = np.linalg.eigvals(system.jacobian(x, omega, gains)).real
     return InhibitedEquilibrium(
         x, wrapped(phase(x) - system.graph.phases), np.hypot(x[:, 0], x[:, 1]),

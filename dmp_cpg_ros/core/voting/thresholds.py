@@ -156,12 +156,14 @@ def _at_the_edge(system: CanonicalSystem, omega: float | Array, voters: Sequence
             break
         alpha -= change
         if abs(change) < 1e-3 * _PRECISION * alpha:
+            there = described(system, x, omega, gains)
+            if not there.slowest_rate > _FIRM * alpha:  # so that the Jacobian is not singular
+                return alpha, False
             moved = np.linalg.solve(slope[:-1, :-1], slope[:-1, -1]).reshape(x.shape)  # −dx/dα
             inwards = -alpha * (off * moved).sum(axis=1) / region_radius**2
-            rest = described(system, x, omega, gains)
-            ahead = (rest.distance - 0.5 * _PRECISION * region_radius * inwards)[list(voters)]
-            return alpha, bool(rest.slowest_rate > _FIRM * alpha and inwards[node] > _FIRM
-                               and ahead.max() < region_radius)
+            ahead = there.distance - 0.5 * _PRECISION * region_radius * inwards
+            return alpha, bool(inwards[node] > _FIRM
+                               and ahead[list(voters)].max() < region_radius)
     return 0.0, False
 
 
