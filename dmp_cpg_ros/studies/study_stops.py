@@ -144,19 +144,23 @@ def summarised(results: Results, by_case: bool = True) -> list[dict[str, Any]]:
     -------
     list of dict
         What the stops of a row have in common (of ``all`` the method only), how many there are,
-        in how many something is so, and of numbers the median and the worst.
+        in how many something is so, and of numbers the median and the worst; None for how many
+        walked on where none was to.
     """
     rows = [(dict(zip(KEY, key, strict=True)), list(group))
             for key, group in groupby(results, lambda result: result[0].row) if by_case]
     rows += [({**dict.fromkeys(KEY), 'gait': 'all', 'method': method},
               [result for result in results if result[0].method == method]) for method in METHODS]
-    return [{**key, **_numbers([outcome for _, outcome in group])} for key, group in rows if group]
+    return [{**key, **_numbers(group)} for key, group in rows if group]
 
 
-def _numbers(outcomes: Sequence[StopOutcome]) -> dict[str, Any]:
-    of = runs.StopSummary(outcomes)
-    return {'cases': len(outcomes), **{name: of.number(name) for name in COUNTED},
-            **{name: of.spread(name) for name, _, _ in SPREADS.values()}}
+def _numbers(results: Results) -> dict[str, Any]:
+    of = runs.StopSummary([outcome for _, outcome in results])
+    numbers = {'cases': len(results), **{name: of.number(name) for name in COUNTED},
+               **{name: of.spread(name) for name, _, _ in SPREADS.values()}}
+    if not any(case.resumes for case, _ in results):
+        numbers['walked_on'] = None
+    return numbers
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -200,13 +204,14 @@ def _kept(outcomes: Sequence[StopOutcome]) -> tuple[str, ...]:
 
 
 def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
-    count, bounded = row['cases'], row['bounded']
+    count, bounded, walked_on = row['cases'], row['bounded'], row['walked_on']
     prediction_error, *others = (
         '-' if row[name][0] is None or isnan(row[name][0]) else ' / '.join(
             f'{scale * one:.{digits}f}' for one in row[name])
         for name, scale, digits in SPREADS.values())
     return (str(count), str(row['fell']), percent(row['standing'], count),
-            percent(row['walked_on'], count) if row['method'] == METHODS[0] else '-',
+            percent(walked_on, count) if row['method'] == METHODS[0] and walked_on is not None
+            else '-',
             prediction_error, f'{row["bound_exceeded"]}/{bounded}' if bounded else '-', *others)
 
 

@@ -253,6 +253,15 @@ def test_the_command_prints_a_row_per_method_and_writes_its_numbers_and_every_ca
         assert len(rows) == 2 and 'inhibition' in rows[0] and rows[1].count('|') == 10
 
 
+def test_how_many_walked_on_is_not_counted_where_none_was_to() -> None:
+    from dmp_cpg_ros.studies.study_stops import summarised, table
+
+    ended = StopCase('trot', 0.5, 0.0, resumes=False)
+    rows = summarised([(ended, StopOutcome(False, True))])
+    assert [row['walked_on'] for row in rows] == [None, None]
+    assert '%' not in table(rows).splitlines()[2].split('|')[10]
+
+
 def test_the_numbers_of_a_row_are_those_of_its_stops_through_their_file() -> None:
     from dmp_cpg_ros.analysis.strict_json import to_json
     from dmp_cpg_ros.studies.study_stops import summarised, table
