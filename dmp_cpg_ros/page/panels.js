@@ -122,7 +122,8 @@ export class Oscillators {
   }
 }
 
-/** Predicted, bounded and measured time of the last stop or start, live while it lasts. */
+/** Predicted, bounded and measured time of the last stop or start, live while it lasts; in words for
+ * who cannot see it. */
 export function drawTimes(canvas, frame) {
   const [ink, width] = begin(canvas);
   const stop = frame.stop || {}, number = (name) => parseFloat(stop[name]);
@@ -146,8 +147,9 @@ export function drawTimes(canvas, frame) {
     }
     write(ink, text || (Number.isFinite(seconds) ? `${seconds.toFixed(3)} s` : '–'), width, y, TEXT, 'right');
   };
+  const now = busy ? 'elapsed' : 'measured', what = frame.requested ? 'to rest' : 'to walking';
   row(11, 'predicted', predicted, '#5aa9f5');
-  row(33, busy ? 'elapsed' : 'measured', taken, taken > bound ? HALT : busy ? '#f0a32f' : GO);
+  row(33, now, taken, taken > bound ? HALT : busy ? '#f0a32f' : GO);
   if (Number.isFinite(bound)) {
     const x = label + bound * scale;
     ink.strokeStyle = TEXT;
@@ -155,8 +157,10 @@ export function drawTimes(canvas, frame) {
     ink.beginPath(); ink.moveTo(x, 0); ink.lineTo(x, 46); ink.stroke();
     write(ink, `bound ${bound.toFixed(3)} s`, Math.min(x, width - 44), 57, TEXT, 'center');
   }
-  const what = frame.requested ? 'to rest' : 'to walking';
   write(ink, what, 0, 57);
+  canvas.setAttribute('aria-label', [['predicted', predicted], [now, taken], ['bound', bound]]
+    .filter(([, seconds]) => Number.isFinite(seconds))
+    .map(([name, seconds]) => `${name} ${seconds.toFixed(3)} s`).join(', ') + ` ${what}`);
 }
 
 /** Which feet bear load, over the last seconds. */

@@ -144,11 +144,16 @@ class FirstWalk:
         Starts it.
     folder : Path
         Where it runs, and keeps its run.
+
+    Attributes
+    ----------
+    said : str
+        What it has written so far.
     """
 
     def __init__(self, command: Sequence[str], folder: Path) -> None:
         """Start it; what is installed elsewhere hears nothing of the packages here."""
-        self._begin, self._said = time.monotonic(), ''
+        self._begin, self.said = time.monotonic(), ''
         self._known = threading.Event()
         own = () if command[0] == sys.executable else OF_THIS_PYTHON
         self._process = subprocess.Popen(
@@ -161,7 +166,7 @@ class FirstWalk:
     def _read(self) -> None:
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            self._said += line
+            self.said += line
             if re.search(ADDRESS, line):
                 self._known.set()
         self._known.set()
@@ -172,7 +177,20 @@ class FirstWalk:
 
     def fails(self, what: str) -> DmpCpgError:
         """What is raised when a step does not come."""
-        return DmpCpgError(f'{what} after {self.seconds():.1f} s: {self._said}')
+        return DmpCpgError(f'{what} after {self.seconds():.1f} s: {self.said}')
+
+    def address(self) -> str:
+        """Wait for the address of the page.
+
+        Raises
+        ------
+        DmpCpgError
+            If none is printed.
+        """
+        self._known.wait(PATIENCE_S)
+        if not (found := re.search(ADDRESS, self.said)):
+            raise self.fails('no address')
+        return found[1]
 
     def measure(self) -> dict[str, float]:
         """Look at the page, drive, push and stop the robot; returns when what was so [s].
@@ -182,12 +200,10 @@ class FirstWalk:
         DmpCpgError
             If a step does not come.
         """
-        self._known.wait(PATIENCE_S)
-        if not (found := re.search(ADDRESS, self._said)):
-            raise self.fails('no address')
+        address = self.address()
         results = {'address_s': self.seconds()}
-        client = ViewClient(found[1])
-        if client.ask(urlsplit(found[1])._replace(scheme='', netloc='').geturl()).status != 200:
+        client = ViewClient(address)
+        if client.ask(urlsplit(address)._replace(scheme='', netloc='').geturl()).status != 200:
             raise self.fails('no page')
         while client.ask('/scene').status != 200:
             if self.seconds() > PATIENCE_S or self._process.poll() is not None:
@@ -228,14 +244,15 @@ class FirstWalk:
                 client.send(velocity=VELOCITY)
         raise AssertionError
 
-    def end(self) -> None:
-        """End it as Ctrl-C does."""
+    def end(self) -> int:
+        """End it as Ctrl-C does, if it has not ended; returns the exit status."""
         with suppress(ProcessLookupError):
             os.killpg(self._process.pid, signal.SIGINT)
         try:
-            self._process.wait(PATIENCE_S)
+            return self._process.wait(PATIENCE_S)
         except subprocess.TimeoutExpired:
             os.killpg(self._process.pid, signal.SIGKILL)
+            return self._process.wait()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,10 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+import by_hand
 import ros_processes
-from browser import Page, browser, find_browser
+from browser import Page
+from by_hand import COARSE, PATIENCE_S, SIZE, drive, heard, start, state
 from checkout import needs_make, recipe
 from ros_processes import (
     BY_ITSELF,
@@ -39,8 +41,7 @@ from dmp_cpg_ros.suite_table import ROBOT, WALKING_NODES
 
 shared_domain, suite, ros = (
     ros_processes.shared_domain, ros_processes.shared_suite, ros_processes.shared_ros)
-
-PATIENCE_S = 90.0
+page = by_hand.page
 
 
 class Client(ViewClient):
@@ -99,15 +100,6 @@ def client(suite: Processes) -> Client:
     client = Client(suite.executable('live_view'))
     client.scene()
     return client
-
-
-def heard(ros: Ros, name: str) -> list[Any]:
-    """Messages of a topic, from when its readers know each other."""
-    topic = interface(name)
-    messages = ros.collect(topic.type, name, topic.reader_qos)
-    count = ros.node.count_publishers
-    ros.spin_until(lambda: bool(count(ros.node.resolve_topic_name(name))))
-    return messages
 
 
 def at_rest(client: Client) -> Any:
@@ -337,78 +329,10 @@ def test_a_view_that_ends_lets_go(client: Client, suite: Processes, ros: Ros) ->
 
 # --- in a browser -------------------------------------------------------------------------------
 
-BROWSER = find_browser()
-
-COARSE = 0.25
-"""Scale of a page at whose picture nobody looks."""
-
-
-@pytest.fixture(scope='module')
-def page() -> Iterator[Page]:
-    if BROWSER is None:
-        pytest.skip('there is no Chromium here (Debian: apt-get install chromium)')
-    with browser(BROWSER) as page:
-        yield page
-
-
-def state(word: str) -> str:
-    return f"document.querySelector('#state').textContent === '{word}'"
-
-
-def start(page: Page, ask: Callable[[], None]) -> None:
-    """Ask for the gait until the answer is yes: who looks after itself for a moment refuses."""
-    answers: list[str] = []
-
-    def agreed() -> bool:
-        page.evaluate("document.querySelector('#answers').replaceChildren()")
-        ask()
-        answers.append(page.until("document.querySelector('#answers').textContent"))
-        refused = 'refused' in answers[-1]
-        assert not refused or BY_ITSELF in answers[-1], answers
-        return not refused
-
-    wait_until(agreed, PATIENCE_S, what=lambda: str(answers))
-
-
-def drive(page: Page, ros: Ros) -> None:
-    """Start, drive by key and by stick, push, and stop a robot that rests, all by hand."""
-    page.until(state('at rest'))
-    page.until("document.querySelector('#robot').textContent === 'mini quadruped'")
-    pushes, commands = heard(ros, 'push'), heard(ros, 'cmd_vel')
-    start(page, lambda: page.click('#resume'))
-    page.key('keyDown', 'ArrowUp')
-    ros.spin_until(lambda: bool(commands) and commands[-1].linear.x == 0.5)
-    page.until(state('walking'))
-    page.key('keyUp', 'ArrowUp')
-    ros.spin_until(lambda: commands[-1].linear.x == 0.0)
-    page.click('#hold')
-    x, y = page.centre('#stick')
-    for kind, up in (('Pressed', 0.0), ('Moved', 50.0), ('Released', 50.0)):
-        page.mouse(kind, x, y - up)
-    ros.spin_until(lambda: commands[-1].linear.x > 0.4)
-    page.until(state('walking'))
-    x, y = page.evaluate("[document.querySelector('#scene').clientWidth / 2, "
-                         "document.querySelector('#scene').clientHeight * 0.45]")
-    page.mouse('Pressed', x, y)
-    page.mouse('Moved', x + 60.0, y)
-    ros.spin_until(lambda: len(pushes) > 2)
-    page.mouse('Released', x + 60.0, y)
-    forces = [push.wrench.force for push in pushes]
-    assert all(force.z == 0.0 for force in forces)
-    assert max(np.hypot(force.x, force.y) for force in forces) > 5.0
-    page.click('#inhibit')
-    # A slow machine has begun to stop by itself before, since the stick is released.
-    page.until("['at rest in', 'already'].some("
-               "words => document.querySelector('#answers').textContent.includes(words))")
-    page.until(state('at rest'))
-    page.until("document.querySelector('#certificate').classList.contains('holds')")
-    assert not page.problems
-
-
 def test_in_a_browser_the_robot_is_driven_pushed_and_stopped(
         client: Client, page: Page, ros: Ros) -> None:
     at_rest(client)
-    page.open(client.address, 900, 640, scale=COARSE)
+    page.open(client.address, *SIZE, scale=COARSE)
     drive(page, ros)
     frame = client.until(lambda frame: frame['at_rest'])
     assert frame['requested'] and frame['stop']['automatic'] == 'false'
@@ -422,7 +346,7 @@ def press(page: Page, button: str) -> None:
 def test_in_a_browser_the_body_lies_down_and_stands_up_and_the_gait_is_chosen(
         client: Client, page: Page) -> None:
     at_rest(client)
-    page.open(client.address, 900, 640, webgl=False)
+    page.open(client.address, *SIZE, webgl=False)
     page.until(state('at rest'))
     mode = "document.querySelector('#mode').textContent"
     page.until(f"{mode} === 'standing'")
@@ -442,7 +366,7 @@ def test_in_a_browser_the_body_lies_down_and_stands_up_and_the_gait_is_chosen(
 @pytest.mark.parametrize('released', ['W', 'Meta'])
 def test_a_key_that_is_released_with_shift_or_meta_drives_no_more(
         client: Client, page: Page, released: str) -> None:
-    page.open(client.address, 900, 640, webgl=False)
+    page.open(client.address, *SIZE, webgl=False)
     ahead = "document.querySelector('#command').textContent.startsWith('0.50 m/s')"
     page.until(f"document.querySelector('#robot').textContent && !({ahead})")
     page.key('keyDown', 'w')
@@ -456,7 +380,7 @@ def test_a_key_that_is_released_with_shift_or_meta_drives_no_more(
 def test_the_space_bar_stops_the_robot_whatever_was_clicked_before(
         client: Client, page: Page, touched: str) -> None:
     at_rest(client)
-    page.open(client.address, 900, 640, webgl=False)
+    page.open(client.address, *SIZE, webgl=False)
     page.until(state('at rest'))
     client.drive()
     page.click(touched)
@@ -471,7 +395,7 @@ def test_the_space_bar_stops_the_robot_whatever_was_clicked_before(
 def test_a_gamepad_drives_and_stops_the_robot(client: Client, page: Page, ros: Ros) -> None:
     at_rest(client)
     references = heard(ros, 'reference')
-    page.open(client.address, 900, 640, webgl=False)
+    page.open(client.address, *SIZE, webgl=False)
     page.until(state('at rest'))
 
     def held(axes: str, button: int | None = None) -> None:
@@ -509,8 +433,7 @@ def test_make_demo_gives_an_address_at_which_the_robot_is_driven_pushed_and_stop
         processes = Processes(domain)
         try:
             walk = processes.start('bash', '-c', command)
-            page.open(walk.wait_for_output(ADDRESS, PATIENCE_S)[1], 900, 640,
-                      scale=COARSE)
+            page.open(walk.wait_for_output(ADDRESS, PATIENCE_S)[1], *SIZE, scale=COARSE)
             drive(page, ros)
             page.open('about:blank')  # which asks nobody who has ended
             os.killpg(walk.pid, signal.SIGINT)  # as a terminal does
@@ -521,7 +444,7 @@ def test_make_demo_gives_an_address_at_which_the_robot_is_driven_pushed_and_stop
 
 
 def test_the_picture_shows_a_robot_and_the_panels_are_drawn(client: Client, page: Page) -> None:
-    page.open(client.address, 900, 640)
+    page.open(client.address, *SIZE)
     page.until(state('at rest'))
     for name in ('oscillators', 'times', 'footfalls', 'speeds', 'stick'):
         page.until(f"(() => {{ const c = document.querySelector('#{name}'); return c.getContext("

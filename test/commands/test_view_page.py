@@ -52,13 +52,14 @@ DRAWN = """
 globalThis.window = {};
 const { Oscillators, drawTimes } = await import('%s');
 const frames = %s.map((frame) => {
-  const done = { texts: [], discs: [], bars: [] };
+  const done = { texts: [], discs: [], bars: [], said: '' };
   const own = { fillText: (text) => done.texts.push(text),
     arc: (x, y, radius) => done.discs.push([x, y, radius]),
     fillRect: (x, y, width) => done.bars.push([ink.fillStyle, width]) };
   const ink = new Proxy(own, { get: (of, name) => (name in of ? of[name] : () => {}),
     set: (of, name, value) => { of[name] = value; return true; } });
-  const canvas = { clientWidth: 300, clientHeight: 226, getContext: () => ink };
+  const canvas = { clientWidth: 300, clientHeight: 226, getContext: () => ink,
+    setAttribute: (name, value) => { done.said = value; } };
   if (frame.x) new Oscillators(canvas).draw(frame, { legs: ['fl', 'fr', 'rl', 'rr'],
     inhibited: ['fl'] });
   else drawTimes(canvas, frame);
@@ -145,6 +146,7 @@ def test_the_last_stop_is_told_with_its_prediction_its_bound_and_what_it_took() 
     assert none['texts'] == ['no stop requested yet']
     told = {'predicted', '1.252 s', 'measured', '1.260 s', 'bound 2.337 s', 'to rest'}
     assert set(ended['texts']) == told
+    assert ended['said'] == 'predicted 1.252 s, measured 1.260 s, bound 2.337 s to rest'
     assert {'elapsed', '1.500 s'} <= set(lasts['texts']) and 'measured' not in lasts['texts']
     assert LATE in [colour for colour, _ in late['bars']]
     assert LATE not in [colour for colour, _ in ended['bars']]

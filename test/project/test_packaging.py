@@ -13,14 +13,19 @@ import sys
 import tarfile
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import distributions
 from pathlib import Path
 from zipfile import ZipFile
 
+import by_hand
 import pytest
+import ros_processes
+from browser import Page
+from by_hand import COARSE, SIZE, drive
 from checkout import PACKAGE, ROOT, imports, modules, setup_argument, setup_constant
-from ros_processes import reserved_domain
+from ros_processes import Ros, reserved_domain
 
 import dmp_cpg_ros
 from dmp_cpg_ros.__main__ import ON_THE_INDEX
@@ -31,9 +36,12 @@ from dmp_cpg_ros.studies.first_walk import (
     OF_THIS_PYTHON,
     FirstWalk,
     as_promised,
+    table,
     typed,
 )
 from dmp_cpg_ros.suite_table import KINDS
+
+ros_domain, ros, page = ros_processes.ros_domain, ros_processes.ros, by_hand.page
 
 CONTRACT = ('reference_filter', 'canonical_oscillators', 'leg_transformation', 'inhibition',
             'posture_control', 'mujoco_robot', 'bag_recorder', 'walk', 'certify', 'analyze',
@@ -388,11 +396,16 @@ def built(folder: Path, what: str) -> Path:
     return folder / 'dist' / done.stdout.splitlines()[-1]
 
 
+def copied(folder: Path) -> Path:
+    """Copy what is in the repository into a folder."""
+    unwanted = shutil.ignore_patterns('.*', 'runs', 'build', '__pycache__', '*.egg-info')
+    return Path(shutil.copytree(ROOT, folder / 'checkout', ignore=unwanted))
+
+
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
     """A copy of what is in the repository."""
-    unwanted = shutil.ignore_patterns('.*', 'runs', 'build', '__pycache__', '*.egg-info')
-    return Path(shutil.copytree(ROOT, tmp_path / 'checkout', ignore=unwanted))
+    return copied(tmp_path)
 
 
 def test_a_wheel_has_the_same_files_from_the_checkout_as_from_an_sdist(
@@ -492,20 +505,26 @@ def ran(folder: Path, *command: str, **more: str) -> subprocess.CompletedProcess
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
 
-@pytest.fixture
-def fresh(tmp_path: Path) -> Iterator[Path]:
+@contextmanager
+def environment(folder: Path) -> Iterator[Path]:
     """Executables of an environment with nothing in it, where the wheels of ROS can be had."""
-    pytest.importorskip('rclpy')
-    bin_ = tmp_path / 'fresh' / 'bin'
-    made = ran(tmp_path, sys.executable, '-m', 'venv', str(bin_.parent))
+    bin_ = folder / 'fresh' / 'bin'
+    made = ran(folder, sys.executable, '-m', 'venv', str(bin_.parent))
     assert made.returncode == 0, made.stdout
-    asked = ran(tmp_path, str(bin_ / 'pip'), '--quiet', 'install', '--dry-run', '--no-deps',
+    asked = ran(folder, str(bin_ / 'pip'), '--quiet', 'install', '--dry-run', '--no-deps',
                 'ros-jazzy-rclpy')
     if asked.returncode != 0:
         pytest.skip(f'no package index has the wheels of ROS for this machine: {asked.stdout}')
     yield bin_
-    for folder in tmp_path.iterdir():  # pytest keeps folders of the last runs
-        shutil.rmtree(folder, ignore_errors=True)
+    for each in folder.iterdir():  # pytest keeps folders of the last runs
+        shutil.rmtree(each, ignore_errors=True)
+
+
+@pytest.fixture
+def fresh(tmp_path: Path) -> Iterator[Path]:
+    """Executables of an environment of one test."""
+    with environment(tmp_path) as bin_:
+        yield bin_
 
 
 @fetched
@@ -524,32 +543,64 @@ def test_a_fresh_environment_with_the_extra_ros_alone_walks_and_reports(
     assert (tmp_path / 'run' / 'report.html').is_file(), walk.stdout
 
 
-@fetched
-@pytest.mark.parametrize(('name', 'package', 'home'), [
-    ('uvx', 'uv', 'UV_CACHE_DIR'), ('pipx', 'pipx', 'PIPX_HOME')])
-def test_one_line_without_an_installation_serves_a_robot_that_walks_and_stops(
-        name: str, package: str, home: str, fresh: Path, checkout: Path, tmp_path: Path,
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    """The line of the documents, typed by somebody who has a wheel and nothing else."""
-    got = ran(tmp_path, str(fresh / 'pip'), '--quiet', 'install', package)
-    if got.returncode != 0:
-        pytest.skip(f'no package index has {package}: {got.stdout}')
+@pytest.fixture(scope='module', params=['uvx', 'pipx'])
+def one_line(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+             ) -> Iterator[list[str]]:
+    """The line of the documents, typed by somebody who has a wheel and nothing else, and who has
+    asked before what the package is; its words.
+    """
+    name, folder = str(request.param), tmp_path_factory.mktemp('one_line')
+    package, home = {'uvx': ('uv', 'UV_CACHE_DIR'), 'pipx': ('pipx', 'PIPX_HOME')}[name]
     (line,) = (line for line in (ROOT / 'doc' / 'index.md').read_text('utf-8').splitlines()
                if line.startswith(f'{name} '))
     assert line == LINES[name]
-    monkeypatch.setenv('PATH', f'{fresh}{os.pathsep}{os.environ["PATH"]}')
-    monkeypatch.setenv(home, str(tmp_path / 'home'))
-    words = typed(line, built(checkout, 'wheel'))
-    where = words.index(PACKAGE)
-    told = ran(tmp_path, *words[:where + 1])  # which fills the cache
-    assert told.returncode == 0 and 'to begin: dmp_cpg_ros walk --view' in told.stdout, told.stdout
-    with reserved_domain() as domain:
-        monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
-        walk = FirstWalk([*words, '--no-report', '--composed', '--rate', '100'], tmp_path)
-        try:
-            assert as_promised(walk.measure())
-        finally:
-            walk.end()
+    with environment(folder) as bin_, pytest.MonkeyPatch.context() as patch:
+        got = ran(folder, str(bin_ / 'pip'), '--quiet', 'install', package)
+        if got.returncode != 0:
+            pytest.skip(f'no package index has {package}: {got.stdout}')
+        patch.setenv('PATH', f'{bin_}{os.pathsep}{os.environ["PATH"]}')
+        patch.setenv(home, str(folder / 'home'))
+        words = typed(line, built(copied(folder), 'wheel'))
+        told = ran(folder, *words[:words.index(PACKAGE) + 1])  # which fills the cache
+        assert told.returncode == 0, told.stdout
+        assert 'to begin: dmp_cpg_ros walk --view' in told.stdout, told.stdout
+        yield words
+
+
+@fetched
+def test_one_line_without_an_installation_serves_a_robot_that_walks_and_stops(
+        one_line: list[str], ros_domain: int, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    walk = FirstWalk(one_line, tmp_path)
+    try:
+        found = walk.measure()
+    finally:
+        walk.end()
+    with capsys.disabled():
+        print('\n' + table([{'way': Path(one_line[0]).name, 'round': 1} | found]))
+    assert as_promised(found)
+
+
+@fetched
+def test_in_a_browser_one_line_without_an_installation_walks_is_pushed_and_stops(
+        one_line: list[str], page: Page, ros: Ros, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    """As a newcomer does it: nothing is added to the line, and Ctrl-C leaves a report."""
+    walk = FirstWalk(one_line, tmp_path)
+    try:
+        address = walk.address()
+        printed = walk.seconds()
+        page.open(address, *SIZE, scale=COARSE)
+        times = drive(page, ros)
+        stopped = walk.seconds()
+        page.open('about:blank')  # which asks nobody who has ended
+        assert walk.end() == 130, walk.said
+    finally:
+        walk.end()
+    with capsys.disabled():
+        print(f'\n{Path(one_line[0]).name}: address after {printed:.1f} s, driven, pushed and '
+              f'stopped after {stopped:.1f} s; the page shows {times}')
+    assert (tmp_path / 'runs' / 'latest' / 'report.html').is_file(), walk.said
 
 
 @installed
