@@ -89,7 +89,7 @@ demo: $(INSTALLED) ## walk, stop and start as in the paper; leaves runs/latest/ 
 
 # What pytest compiles is kept for the other worker and the next run, whatever is usual here.
 test: $(INSTALLED) ## run the whole test suite (PYTEST_ARGS=...)
-	$(ACTIVATED) cd test && PYTHONDONTWRITEBYTECODE= python -m pytest -p xdist -n $(TEST_WORKERS) --dist worksteal --max-suite-reruns 3 \
+	$(ACTIVATED) cd test && PYTHONDONTWRITEBYTECODE= python -m pytest -p xdist -n $(TEST_WORKERS) --dist worksteal --max-suite-reruns 3 -rfER \
 	  --durations=20 --durations-min=8 $(PYTEST_ARGS)
 
 test-extras: $(INSTALLED) ## run the tests that need more: other robots, a URDF reader, the site, Parquet, a cluster, minutes

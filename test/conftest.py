@@ -37,6 +37,26 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line('markers', 'flaky(reruns=1): run once more when it fails')
 
 
+class Folder(pytest.Dir):
+    """A folder of tests from which every worker reads another part first.
+
+    Whoever comes first compiles a file, and the others find it compiled; side by side they would
+    all compile all of them.
+    """
+
+    def collect(self) -> list[pytest.Item | pytest.Collector]:
+        """What is in it."""
+        found, worker = list(super().collect()), getattr(self.config, 'workerinput', None)
+        begin = 0 if worker is None else (
+            int(worker['workerid'].removeprefix('gw')) * len(found) // worker['workercount'])
+        return [*found[begin:], *found[:begin]]
+
+
+def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Collector:
+    """Read a folder."""
+    return Folder.from_parent(parent, path=path)
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Begin with what takes long, in every worker: they then end at the same time.
 
@@ -48,6 +68,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     def rank(item: pytest.Item) -> int:
         folder = item.path.relative_to(Path(__file__).parent).parts[0]
         return LONG.index(folder) if folder in LONG else len(LONG)
+
+    items.sort(key=lambda item: item.path)  # which every worker has read in an order of its own
 
     workers = getattr(config, 'workerinput', {}).get('workercount', 1)
     parts: list[list[pytest.Item]] = [[] for _ in range(workers)]
