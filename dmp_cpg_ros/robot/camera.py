@@ -33,6 +33,7 @@ Mark = Callable[[mujoco.MjData, mujoco.MjvScene], None]
 AZIMUTH, ELEVATION = 140.0, -16.0  # [deg] onto the robot's right side and face
 DISTANCE_OVER_HEIGHT = 3.6  # distance of the camera over the robot's stance height
 PLAIN_SHADOW = 2048  # texels along a side of the shadow map
+PLAIN_SLICES, PLAIN_STACKS = 16, 10  # faces around and along what is round
 FAR_CLIPPING = 400.0  # in units of the model's extent
 
 COLOURS = {'fl': (0.86, 0.15, 0.15), 'fr': (0.10, 0.38, 0.90), 'rl': (0.95, 0.60, 0.05),
@@ -54,7 +55,8 @@ class Camera:
     world : World, optional
         What it walks on; the flat floor without.
     plain : bool
-        Whether to leave out what is costly to draw: reflections, the finest shadows.
+        Whether to leave out what is costly to draw: reflections, the finest shadows, the
+        finest faces of what is round.
 
     Attributes
     ----------
@@ -83,6 +85,8 @@ class Camera:
             quality = self.model.vis.quality
             quality.shadowsize = min(quality.shadowsize, PLAIN_SHADOW)
             quality.offsamples = min(quality.offsamples, 2)
+            quality.numslices = min(quality.numslices, PLAIN_SLICES)
+            quality.numstacks = min(quality.numstacks, PLAIN_STACKS)
             self.model.mat_reflectance[:] = 0.0
         self._data = mujoco.MjData(self.model)
         self._renderer, self.reason = _renderer(self.model, width, height)

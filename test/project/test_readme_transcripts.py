@@ -17,6 +17,7 @@ pytest.importorskip('rclpy')
 
 from checkout import setup_constant
 from ros_processes import (
+    SHARED_HZ,
     NodeProcess,
     Processes,
     Ros,
@@ -39,14 +40,12 @@ pytestmark = pytest.mark.skipif(
 SETTLED_NS = 1_000_000_000
 """Time on the robot's clock without a change after which it has done what it was told [ns]."""
 
-AT_USUAL_RATE = ('README.md',)
-"""Documents that show numbers which depend on the control rate; the walks of all others are
-typed with the option of another one, and their parameter files have it: the machine has less to
-do.
+RATES_HZ = {'README.md': None, 'usage.md': 100.0}
+"""Control rates of documents that show numbers which depend on it: the usual one, and the one
+above that at which a change that is refused loses rows of the step, too. The walks of all others
+are typed with the option of a lower one, and their parameter files have it: the machine has less
+to do.
 """
-
-RATE_HZ = 100.0
-"""That rate; at half of it a change that is refused loses rows of the step, too."""
 
 PATIENCE_S = 240.0
 """How long a loaded machine may take [s]."""
@@ -131,8 +130,8 @@ def reader(document: Path, tmp_path: Path) -> Iterator[Reader]:
     with reserved_domain() as domain, pytest.MonkeyPatch.context() as patch:
         patch.setenv('ROS_DOMAIN_ID', str(domain))
         prepare_middleware()
-        started = Reader(domain, tmp_path, '' if document.name in AT_USUAL_RATE else (
-            f' --rate {RATE_HZ}'))
+        rate = RATES_HZ.get(document.name, SHARED_HZ)
+        started = Reader(domain, tmp_path, f' --rate {rate}' if rate else '')
         try:
             yield started
         finally:
@@ -142,7 +141,8 @@ def reader(document: Path, tmp_path: Path) -> Iterator[Reader]:
 @pytest.mark.parametrize('document', TRANSCRIPTS, ids=lambda document: document.name)
 def test_what_the_transcripts_show_is_what_happens(reader: Reader, document: Path) -> None:
     for name, content in files(document).items():
-        slower = f'\\g<0>\n    control_rate: {RATE_HZ}' if reader.options else '\\g<0>'
+        rate = RATES_HZ.get(document.name, SHARED_HZ)
+        slower = f'\\g<0>\n    control_rate: {rate}' if rate else '\\g<0>'
         (reader.folder / name).write_text(
             re.sub('ros__parameters:$', slower, content, flags=re.MULTILINE), encoding='utf-8')
     happened = [(command, shown, reader.type(command)) for command, shown in transcript(document)]

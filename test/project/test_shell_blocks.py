@@ -51,10 +51,10 @@ BESIDE = {'stand_by.yaml', '--view'}
 are typed with ``--lock-step``, in which nobody waits for the robot, and it need not lie down.
 """
 
-SPREAD = {'--composed', '--respawn'}
-"""Options about processes. Walks with none of them are typed with the first, but for a bare
-``walk``: in one process they publish the same, bit for bit (``test_suite_walks.py``), and take a
-third of the time.
+SPREAD = '--composed'
+"""Option with which walks are typed, but for a bare ``walk``: in one process they publish the
+same, bit for bit (``test_suite_walks.py``), and take a third of the time. Ten processes that are
+restarted are in ``test_respawn.py``.
 """
 
 CLIENTS = ('robot_client', 'live_view')
@@ -203,7 +203,7 @@ class Reader:
         """Options that are typed with those of a walk."""
         if self.usual_rate and not words:
             return [*SHORT]
-        return [*LIGHT, *(['--composed'] if words and not SPREAD & set(words) else []),
+        return [*LIGHT, *([SPREAD] if words and SPREAD not in words else []),
                 *([] if BESIDE & set(words) else ['--lock-step'])]
 
     def make(self, words: list[str]) -> None:
