@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from checkout import ROOT
 
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.inequality import STEP_ROWS
+from dmp_cpg_ros.studies import certified_grid
 from dmp_cpg_ros.studies.certificate_settings import GRAPHS, TICK, grid
 from dmp_cpg_ros.studies.certified_grid import (
     as_certified,
@@ -75,6 +77,21 @@ def test_a_certified_setting_that_fails_is_counted() -> None:
     (ring,) = (row for row in rows if row['settings'])
     assert ring['certified'] == len(refused) > ring['stop']
     assert not as_certified(ring)
+
+
+def test_the_command_writes_the_counts_of_every_graph(
+        monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    """Of every sixteenth setting, and of one that it counts as failing."""
+    monkeypatch.setattr(certified_grid, 'grid', lambda _: grid()[::16])
+    file = tmp_path / 'counts.json'
+    assert certified_grid.main(['--json', str(file)]) == 0
+    rows = json.loads(file.read_text(encoding='utf-8'))
+    assert [row['graph'] for row in rows] == list(GRAPHS)
+    assert sum(row['settings'] for row in rows) == len(grid()[::16])
+    assert certified_grid.table(rows) in capsys.readouterr().out
+    monkeypatch.setattr(certified_grid, 'as_certified', lambda row: row['graph'] != 'ring')
+    assert certified_grid.main([]) == 1
 
 
 def test_most_certified_settings_have_a_proved_step() -> None:
