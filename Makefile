@@ -101,7 +101,8 @@ test-extras: $(INSTALLED) ## run the tests that need more: other robots, a URDF 
 	  --include='test_*.py' .) $(PYTEST_ARGS)
 
 test-install: $(INSTALLED) ## walk from the wheel in a fresh environment, by uvx and by pipx, in a browser; build with colcon
-	$(ACTIVATED) cd test && FRESH_INSTALL=1 python -m pytest -rs project/test_packaging.py -k 'fresh_environment or without_an_installation or colcon'
+	$(ACTIVATED) cd test && FRESH_INSTALL=1 python -m pytest -rs project/test_packaging.py commands/test_live_view.py \
+	  -k 'fresh_environment or without_an_installation or colcon or make_demo'
 
 study-stops: $(INSTALLED) ## stop and start at 16 phases x 3 speeds x amble, walk, trot (STUDY_ARGS=...)
 	$(ACTIVATED) study_stops $(STUDY_ARGS)
