@@ -131,7 +131,6 @@ def test_a_command_asks_for_the_cases_of_its_file(
     assert HERE[name]([*arguments, '--json', str(file)]) == 0
     found = json.loads(file.read_text(encoding='utf-8'))
     if isinstance(written, list):  # an outcome may tell more today than it did
-        assert [one.keys() >= of.keys() for one, of in zip(found, written, strict=True)]
         found = [{name: one[name] for name in of}
                  for one, of in zip(found, written, strict=True)]
     assert found == written
