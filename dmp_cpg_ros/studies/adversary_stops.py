@@ -104,7 +104,7 @@ def judge_posture(description: RobotDescription, case: Case, weaken: bool) -> Ju
         return loop
     network, height = loop.network, 0.0
     places = network.gait.cycle_position(np.arctan2(-loop.x[:, 1], loop.x[:, 0]))
-    for place, activity in zip(places.tolist(), loop.stop.activity.tolist(), strict=True):
+    for place, activity in zip(places.tolist(), loop.stop.activity, strict=True):
         path = FootPath((0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 1.0, network.gait.duty(
             0.0, network.scale), loop.parameters.leg.clearance * activity)
         height = max(height, float(path.at(place)[0][2]))

@@ -161,7 +161,7 @@ def _highest(loop: WalkingLoop, motion: LearnedMotion, description: RobotDescrip
     return max(motion.of_leg(leg, description).step(None, FootPath(
         (0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 1.0, of.gait.duty(0.0, of.scale),
         loop.parameters.leg.clearance * activity * tall), place, 0.0, 0.0)[1][2]
-        for leg, place, activity in zip(LEGS, places, loop.stop.activity.tolist(), strict=True)
+        for leg, place, activity in zip(LEGS, places, loop.stop.activity, strict=True)
                ) / tall
 
 

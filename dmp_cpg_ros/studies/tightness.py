@@ -353,7 +353,7 @@ def rest_row(graph: str) -> Row:
     fastest = np.array([p.reference.max_speed, p.reference.max_lateral_speed,
                         p.reference.max_turn_rate])
     walking = replace(supervisor.initial_state(), state='walking', requested=False, armed=False,
-                      automatic=False, activity=np.ones(SIZE))
+                      automatic=False, activity=(1.0,) * SIZE)
     start = canonical.initial_state(gait, replace(p.inhibition, start_inhibited=False))
     slowest = max(
         look_ahead(supervisor, ReferenceSystem(p.reference), canonical,

@@ -53,8 +53,6 @@ from dmp_cpg_ros.core.transformation.leg import body_scale, nominal_foothold
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
 
-LEFT = (0.0, 1.0, 0.0)
-
 LARGEST_LOAD = 2.0
 """Largest normal force of a fully loaded foot, in weights of the robot."""
 
@@ -67,7 +65,7 @@ class PostureState(NamedTuple):
 
     Attributes
     ----------
-    activity : ndarray (4,)
+    activity : tuple of four floats
         Swing activity of the legs.
     integral : VelocityCorrection
         State of the slow loop of velocity and heading.
@@ -81,7 +79,7 @@ class PostureState(NamedTuple):
         Whether what is felt again is late.
     """
 
-    activity: Array
+    activity: tuple[float, ...]
     integral: VelocityCorrection = VelocityCorrection()
     plan: MotionPlan = MotionPlan()
     offset: MassOffset = MassOffset()
@@ -100,7 +98,7 @@ class Stride(NamedTuple):
         Rates of the cycle and of those of the legs [rad/s], and share of stance.
     positions : list of four floats
         In the cycle when the targets act, 0 at mid-swing, ±1/2 at mid-stance.
-    activity, moving : ndarray (4,), float
+    activity, moving : tuple of four floats, float
         Swing activity of the legs, and its mean.
     load : list of four floats
         What the feet carry, in shares.
@@ -111,7 +109,7 @@ class Stride(NamedTuple):
     own_omegas: Sequence[float]
     duty: float
     positions: list[float]
-    activity: Array
+    activity: tuple[float, ...]
     moving: float
     load: list[float]
 
@@ -154,7 +152,7 @@ class PostureController:
 
     def initial_state(self) -> PostureState:
         """State of a robot that stands."""
-        return PostureState(np.zeros(len(self.kinematics)))
+        return PostureState((0.0,) * len(self.kinematics))
 
     def step(self, memory: PostureState, state: RobotState, gait: GaitInForce, x: Array,
              x_dot: Array, r: Array, dt: float,
@@ -225,7 +223,7 @@ class PostureController:
                 across, R_ground_base, level if terrain.barred else LEVEL_FEET),
             np.array(self.placement.drift(
                 self.placement.yielding(p, stride.reference[0], gait.firm, plan.acceleration),
-                measured, planned, stride.activity.tolist(), sway.velocity)),
+                measured, planned, stride.activity, sway.velocity)),
             np.array(correction), command, state.joint_position, forces,
             self._margins(R_ground_base, feet, stride, under, error),
             Progress((measured[0], measured[1]), feet_behind(
@@ -233,19 +231,18 @@ class PostureController:
                 stride.omega), terrain.rough, terrain.gaps, float(terrain.high >= 0)),
             state.felt_legs or FELT, level)
 
-    def _stride(self, activity: Array, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
-                dt: float) -> Stride:
+    def _stride(self, activity: tuple[float, ...], gait: GaitInForce, x: Array, x_dot: Array,
+                r: Array, dt: float) -> Stride:
         """What the gait has the legs do, from their activity one tick before."""
         p = self.parameters
         reference, omega, own_omegas, duty = gait.pace(r, self.scale)
         rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]
         activity = activities_step(activity, rates, own_omegas, p.activity_rate, dt)
-        swings = activity.tolist()
         positions = [gait.scalar_cycle_position(scalar_phase(x_1, x_2) + p.target_lead * rate)
                      for (x_1, x_2), rate in zip(x.tolist(), rates, strict=True)]
-        load = virtual_model.contact_weights(positions, duty, swings, p.load_transfer)
+        load = virtual_model.contact_weights(positions, duty, activity, p.load_transfer)
         return Stride(reference, omega, own_omegas, duty, positions, activity,
-                      sum(swings) / len(swings), load)
+                      sum(activity) / len(activity), load)
 
     def _slow_loops(self, memory: PostureState, stride: Stride, gait: GaitInForce,
                     R_ground_base: Matrix, quaternion: Array, velocity: Triple, dt: float
@@ -288,18 +285,17 @@ class PostureController:
         """Memory of the ground, and heights of feet over the plane that the body follows [m]."""
         if not self.parameters.climbing:
             return NOTHING_FELT, LEVEL_FEET
-        place = vec3.triple(state.base_position_in_world.tolist())
-        n = vec3.times(R_world_base, normal_in_base)
-        speed = self.scale.foot_speed(*measured)
-        limit = SLOW * self.scale.speed(gait.highest(self.scale))
-        calm = (gait.firm >= 1.0 and abs(vec3.dot(n, vec3.times(R_world_base, LEFT))) < ROLLING
-                and speed < limit and self.scale.foot_speed(*stride.reference) < limit)
+        (_, left_x, _), (_, left_y, _), (_, left_z, _) = R_world_base
+        place, scale = vec3.triple(state.base_position_in_world.tolist()), self.scale
+        n, left = vec3.times(R_world_base, normal_in_base), (left_x, left_y, left_z)
+        speed, limit = scale.foot_speed(*measured), SLOW * scale.speed(gait.highest(scale))
+        calm = (gait.firm >= 1.0 and abs(vec3.dot(n, left)) < ROLLING
+                and speed < limit and scale.foot_speed(*stride.reference) < limit)
         swung = [position / (1.0 - stride.duty) + 0.5 for position in stride.positions]
         touches, rests = contacts(
-            state, forces, [resting(*of) for of in zip(
-                stride.activity.tolist(), memory.activity.tolist(), strict=True)],
-            legs, self._quarter_weight)
-        quiet = speed < self.scale.speed(QUIET)
+            state, forces, [*map(resting, stride.activity, memory.activity)], legs,
+            self._quarter_weight)
+        quiet = speed < scale.speed(QUIET)
         return memory.terrain.felt(
             place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot, _ in legs],
             n, swung, touches, self.scale.leg_length, calm,
@@ -309,8 +305,7 @@ class PostureController:
                  under: Pair, error: Pair) -> tuple[float, ...]:
         """Margins of the capture point for an error of the velocity [m/s]; swings at footholds."""
         places, downhill, slope_lean = [], (*under, 0.0), self.parameters.slope_lean
-        for foot, foothold, swing in zip(
-                feet, self._footholds, stride.activity.tolist(), strict=True):
+        for foot, foothold, swing in zip(feet, self._footholds, stride.activity, strict=True):
             place = vec3.moved(vec3.times(R_ground_base, foothold), downhill, slope_lean)
             places.append(vec3.moved(foot, vec3.minus(place, foot), swing))
         return support_margins(

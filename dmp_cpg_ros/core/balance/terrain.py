@@ -239,27 +239,27 @@ class Terrain(NamedTuple):
         """
         way = dist(place, self.place)
         anew = not self.footholds or way > JUMP * leg_length
-        # a foot with a silent sensor stands in the end, but no higher: a tilting body lifts it off
-        footholds = tuple(feet) if anew else tuple(
-            now if (touch and not 0.0 <= share <= 1.0) or (
-                share < 0.0 and dot(normal, now) <= dot(normal, last)) else last
-            for now, last, share, touch in zip(feet, self.footholds, swung, touches, strict=True))
-        heights = [dot(normal, foot) for foot in footholds]
-        mean = sum(heights) / len(heights)
+        swings, levels = [0.0 <= share <= 1.0 for share in swung], [dot(normal, at) for at in feet]
+        footholds, heights = [*feet], [*levels]
+        for i, last in enumerate(() if anew else self.footholds):
+            height = dot(normal, last)
+            # a foot with a silent sensor stands in the end, but no higher: a tilting body lifts it
+            if not ((touches[i] and not swings[i]) or (swung[i] < 0.0 and levels[i] <= height)):
+                footholds[i], heights[i] = last, height
         low, lower, higher, high = sorted(heights)
+        mean, middle = sum(heights) / len(heights), 0.5 * (lower + higher)
         rough = 0.0 if anew else self.rough * exp(-way / (FADES * leg_length))
-        middle = 0.5 * (lower + higher)
-        found = calm and high - middle > STEP * leg_length
-        if found or (rough and high - low > UNEVEN * leg_length):
+        if (calm and high - middle > STEP * leg_length) or (
+                rough and high - low > UNEVEN * leg_length):
             rough = max(rough, high - low)
         even = not (anew or self.gaps) and middle - low < HOLLOW * leg_length
         tells = rough > 0.0 or (calm and even)
         barred = 0.0 if anew else max(0.0, self.barred - way)
-        met = -1 if self.high < 0 or not 0.0 <= swung[self.high] <= 1.0 else self.high
-        lifted, changes, changed = self._in_swings(swung, touches)
-        for i, (foot, share, touch) in enumerate(zip(feet, swung, touches, strict=True)):
+        met = -1 if self.high < 0 or not swings[self.high] else self.high
+        lifted, changes, changed = self._in_swings(swung, swings, touches)
+        for i, (level, share, touch) in enumerate(zip(levels, swung, touches, strict=True)):
             if tells and touch and lifted[i] and SCUFFING[0] < share < SCUFFING[1]:
-                height = dot(normal, foot) - mean
+                height = level - mean
                 if height > CLIMBED * leg_length:
                     if changes[i] <= FLICKERS or share - changed[i] > STEADY:
                         barred, met = FADES * leg_length, i
@@ -268,43 +268,41 @@ class Terrain(NamedTuple):
         if barred:
             rough = max(self.rough * exp(-RELAXES * dt), (high - low) * (
                 high - low > UNEVEN * leg_length))
-        empty, deep = (tuple(
-            not (touch or 0.0 <= share <= 1.0) and middle - dot(normal, foot) > below * leg_length
-            for foot, share, touch in zip(feet, swung, touches, strict=True))
-            for below in (HOLLOW, DEEP))
-        hangs = not anew and in_turn and (calm or self.gaps) and any(empty)
+        depths = [0.0 if touch or swinging else middle - level
+                  for level, touch, swinging in zip(levels, touches, swings, strict=True)]
+        hangs = not anew and in_turn and (calm or self.gaps) and max(depths) > HOLLOW * leg_length
         gaps = FADES * leg_length if hangs else 0.0 if anew else max(0.0, self.gaps - way)
         rough = min(rough, HIGHEST * leg_length) if rough > FORGOTTEN * leg_length else 0.0
-        walked = self.walked or any(
-            0.0 <= share <= 1.0 and not (touch or rest)
-            for share, touch, rest in zip(swung, touches, rests, strict=True))
+        walked = self.walked or any(swinging and not (touch or rest) for swinging, touch, rest
+                                    in zip(swings, touches, rests, strict=True))
         sink = SINKING * leg_length * quiet_s * (walked and sum(touches) >= STANDING)
         lowered = LEVEL_FEET if not any(rests) and self.lowered is LEVEL_FEET else tuple(
-            0.0 if 0.0 <= share <= 1.0 and not rest else
+            0.0 if swing and not rest else
             max(last - sink * (rest and not touch), -LOWEST * leg_length)
-            for last, rest, share, touch in zip(self.lowered, rests, swung, touches, strict=True))
+            for last, rest, swing, touch in zip(self.lowered, rests, swings, touches, strict=True))
         terrain = Terrain(
-            rough, gaps, footholds, place, lowered if any(lowered) else LEVEL_FEET, walked,
+            rough, gaps, tuple(footholds), place, lowered if any(lowered) else LEVEL_FEET, walked,
             barred, met, lifted, tuple(touches), changes, changed,
-            deep if hangs and rough == 0.0 else NO_FOOT)
+            tuple(depth > DEEP * leg_length for depth in depths)
+            if hangs and rough == 0.0 else NO_FOOT)
         return terrain, terrain.lowered if rough == 0.0 else tuple(
             height - mean - RAISED * rough + down - (
                 SEARCHED * leg_length if share > 1.0 and not (touch or rest) else 0.0)
             for height, down, rest, share, touch in zip(
                 heights, lowered, rests, swung, touches, strict=True))
 
-    def _in_swings(self, swung: Sequence[float], touches: Sequence[bool]
+    def _in_swings(self, swung: Sequence[float], swings: Sequence[bool], touches: Sequence[bool]
                    ) -> tuple[tuple[bool, ...], tuple[int, ...], tuple[float, ...]]:
         """``lifted``, ``changes`` and ``changed``."""
-        swinging = [0.0 <= share <= 1.0 for share in swung]
-        turned = [touch != last for touch, last in zip(touches, self.touched, strict=True)]
-        return tuple(
-            swings and (before or not touch)
-            for before, swings, touch in zip(self.lifted, swinging, touches, strict=True)), tuple(
-            before + now if swings else 0 for before, now, swings
-            in zip(self.changes, turned, swinging, strict=True)), tuple(
-            share if now else before
-            for before, now, share in zip(self.changed, turned, swung, strict=True))
+        lifted, changes, changed = [], [], []
+        for share, swinging, touch, before, free, count, last in zip(
+                swung, swings, touches, self.touched, self.lifted, self.changes, self.changed,
+                strict=True):
+            turned = touch != before
+            lifted.append(swinging and (free or not touch))
+            changes.append(count + turned if swinging else 0)
+            changed.append(share if turned else last)
+        return tuple(lifted), tuple(changes), tuple(changed)
 
 
 def contacts(state: RobotState, forces: Array, rests: Sequence[bool],
@@ -326,10 +324,12 @@ def contacts(state: RobotState, forces: Array, rests: Sequence[bool],
     quarter : float
         A quarter of the robot's weight [N].
     """
-    told, efforts, known = (
-        of.tolist() for of in (state.foot_force, state.joint_effort, forces))
+    known = forces.tolist()
     touches = [force > (UNLOADED if rest else LOADED) * quarter
                for force, rest in zip(known, rests, strict=True)]
+    if not any(rests):
+        return touches, [*rests]
+    told, efforts = state.foot_force.tolist(), state.joint_effort.tolist()
     return touches, [
         rest and force == said and (touch or pressure(jacobian, efforts[3 * i:3 * i + 3])
                                     < LOADED * quarter)

@@ -39,7 +39,7 @@ def adopted(acting: Inhibition, time_ns: int, parameters: InhibitionParameters
     voted = stop and bool(np.any(gains > parameters.gains_on(leg)))
     return SupervisorState(
         time_ns, word if stop else 'releasing', stop, acting.automatic, time_ns, armed,
-        np.full(len(LEGS), 0.0 if acting.at_rest else 1.0),
+        (0.0 if acting.at_rest else 1.0,) * len(LEGS),
         measured_s=0.0 if acting.at_rest else float('nan'), asked=stop, voted=voted,
         vote_gains=gains if voted else np.zeros(len(LEGS)), leg=leg,
         rest_phase=acting.rest_phase, quickness=acting.quickness)

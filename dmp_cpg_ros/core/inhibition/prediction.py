@@ -273,7 +273,7 @@ def next_gait(reference: ReferenceSystem, canonical: RunningGait, published: Ann
 def _up(canon: CanonicalState, state: SupervisorState, duty: float) -> tuple[bool, ...]:
     """Which feet are in the air, of fl, fr, rl, rr."""
     up = []
-    for (x_1, x_2), activity in zip(canon.x.tolist(), state.activity.tolist(), strict=True):
+    for (x_1, x_2), activity in zip(canon.x.tolist(), state.activity, strict=True):
         position = canon.gait.scalar_cycle_position(scalar_phase(x_1, x_2))
         swung = position / (1.0 - duty) + 0.5
         up.append(0.0 < swung < 1.0 and activity * swing_height(swung)[0] > DOWN)

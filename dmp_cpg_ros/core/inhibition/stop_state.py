@@ -36,7 +36,7 @@ class SupervisorState:
         Stamp at which the present stop or start was requested [ns].
     armed : bool
         Whether the inhibition's gains are on.
-    activity : ndarray (4,)
+    activity : tuple of four floats
         Swing activity of the legs.
     measured_s : float
         Time from the request to rest or to phase lock [s]; NaN until then.
@@ -70,7 +70,7 @@ class SupervisorState:
     automatic: bool
     request_ns: int
     armed: bool
-    activity: Array
+    activity: tuple[float, ...]
     measured_s: float = float('nan')
     idle_ns: int = -1
     asked: bool = False

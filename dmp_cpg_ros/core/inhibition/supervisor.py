@@ -101,7 +101,7 @@ class GaitSupervisor:
         """At rest, a leg inhibited, or free when ``start_inhibited`` is false."""
         stopped = self.parameters.start_inhibited
         return SupervisorState(time_ns, 'at_rest' if stopped else 'free', stopped, True, time_ns,
-                               stopped, np.full(len(LEGS), 0.0 if stopped else 1.0),
+                               stopped, (0.0 if stopped else 1.0,) * len(LEGS),
                                measured_s=0.0, asked=stopped, leg=leg)
 
     def inhibition(self, state: SupervisorState) -> Inhibition:
@@ -307,7 +307,7 @@ class GaitSupervisor:
         if not (armed and inside):
             return replace_unchecked(state, armed=armed, state='waiting')
         if (max(map(abs, rates)) > REST_PHASE_RATE or speed > REST_SPEED
-                or max(state.activity.tolist()) > REST_ACTIVITY):
+                or max(state.activity) > REST_ACTIVITY):
             return replace_unchecked(state, armed=armed, state='captured')
         return replace_unchecked(state, armed=armed, state='at_rest',
                                  measured_s=self._measured(state))
@@ -334,7 +334,7 @@ class GaitSupervisor:
 
     def _running(self, state: SupervisorState, errors: Array, speed: float) -> SupervisorState:
         in_step = max(map(abs, errors.tolist())) <= LOCKED_PHASE_ERROR
-        swinging = min(state.activity.tolist())
+        swinging = min(state.activity)
         if state.state == 'releasing' and not (in_step and swinging >= LOCKED_ACTIVITY):
             return state
         now, measured_s = 'walking' if in_step and speed > REST_SPEED else 'free', state.measured_s

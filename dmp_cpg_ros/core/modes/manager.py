@@ -12,6 +12,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -181,7 +182,7 @@ class ModeManager:
         return max(begin, end) * min(rest / 0.3, 1.0)
 
     def step(self, mode: ModeState, state: RobotState, x: Array, x_dot: Array, r: Array,
-             activity: Array) -> ModeState:
+             activity: Sequence[float]) -> ModeState:
         """Advance the mode to the tick of a measured state.
 
         Parameters
@@ -194,14 +195,14 @@ class ModeManager:
             Canonical states and rates.
         r : ndarray (3,)
             Reference.
-        activity : ndarray (4,)
+        activity : sequence of four floats
             Swing activity of the legs at the tick before.
         """
         at_rest = (
             mode.mode == 'stopping'
             and self._scale.foot_speed(float(r[0]), float(r[1]), float(r[2])) <= REST_SPEED
             and float(np.abs(phase_rate(x, x_dot)).max()) <= REST_PHASE_RATE
-            and float(activity.max()) <= REST_ACTIVITY)
+            and max(activity) <= REST_ACTIVITY)
         return self.advance(mode, self._sense.condition(state), state.time_ns, at_rest)
 
     def advance(self, state: ModeState, condition: falls.BodyCondition, time_ns: int, at_rest: bool

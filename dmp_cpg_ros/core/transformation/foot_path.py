@@ -172,14 +172,14 @@ def activity_step(activity: float, phase_rate: float, omega: float, rate: float,
     return wanted + (activity - wanted) * exp(-rate * dt)
 
 
-def activities_step(activities: Array, phase_rates: list[float], omegas: list[float], rate: float,
-                    dt: float) -> Array:
-    """As :func:`activity_step` for a few legs, (n,), without arithmetic on arrays."""
+def activities_step(activities: Sequence[float], phase_rates: Sequence[float],
+                    omegas: Sequence[float], rate: float, dt: float) -> tuple[float, ...]:
+    """As :func:`activity_step` for a few legs."""
     kept, after = exp(-rate * dt), []
-    for activity, phase_rate, omega in zip(activities.tolist(), phase_rates, omegas, strict=True):
+    for activity, phase_rate, omega in zip(activities, phase_rates, omegas, strict=True):
         wanted = clamped(phase_rate / omega, 0.0, 1.0)
         after.append(wanted + (activity - wanted) * kept)
-    return np.array(after)
+    return tuple(after)
 
 
 def resting(activity: float, before: float) -> bool:

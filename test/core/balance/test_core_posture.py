@@ -225,7 +225,7 @@ def test_feet_that_walk_on_a_slope_hold_the_body_as_on_level_ground(slope: tuple
     turn = axis / np.linalg.norm(axis) * np.arccos(normal[2])
     leaning = replace(level, base_quaternion=turned(level.base_quaternion, turn),
                       ground_normal_in_world=normal)
-    walking = of.initial_state()._replace(activity=np.ones(4))
+    walking = of.initial_state()._replace(activity=(1.0,) * 4)
     (flat, steep), (_, stood) = ([
         np.array(of.step(memory, state, AMBLE, x, 0.0 * x, np.zeros(3), TICK)[1].margins)
         for state in (level, leaning)] for memory in (walking, of.initial_state()))

@@ -47,7 +47,7 @@ class Gait:
         self.supervisor = GaitSupervisor(
             inhibition, VotingParameters(), LEG.activity_rate, reference)
         self.stop = stop or replace(self.supervisor.initial_state(), state='walking',
-                                    requested=False, armed=False, activity=np.ones(4))
+                                    requested=False, armed=False, activity=(1.0,) * 4)
         self.published, self.x, self.r = self.supervisor.inhibition(self.stop), x, r
         self.command = tuple(r.tolist())
         self.tick_count = 0

@@ -24,7 +24,7 @@ KINDS = (RUNS, STOPS, ARMED, replace(ARMED, at_rest=True), replace(RUNS, share=0
 
 def state_at(tick: int, pushed: bool = False) -> SupervisorState:
     push = NO_PUSH._replace(acts=pushed)
-    return SupervisorState(tick * TICK_NS, 'walking', False, True, 0, False, np.ones(4), push=push)
+    return SupervisorState(tick * TICK_NS, 'walking', False, True, 0, False, (1.0,) * 4, push=push)
 
 
 @given(told=st.lists(st.tuples(st.integers(0, 40), st.sampled_from(KINDS),

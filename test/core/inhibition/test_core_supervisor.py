@@ -274,7 +274,7 @@ def test_feet_are_down_and_the_reference_has_gone_as_far_as_was_looked_ahead(
         duty = tick.gait.pace(tick.r, run.loop.canonical.scale)[3]
         swung = tick.gait.cycle_position(phase(tick.x)) / (1.0 - duty) + 0.5
         height = [swing_height(s)[0] if 0.0 < s < 1.0 else 0.0 for s in swung.tolist()]
-        if max(tick.supervisor.activity * height) > DOWN:
+        if max(np.multiply(tick.supervisor.activity, height)) > DOWN:
             lifted.append(k * TICK)
     assert outlook.down_s == pytest.approx(lifted[-1]) and 0.0 < outlook.down_s < outlook.time_s
     assert outlook.stands_s < outlook.stands_within_s
