@@ -285,8 +285,10 @@ def _repeated_forces(readings: SensorReadings, last: SensorReadings) -> list[boo
     """Which feet are loaded and tell the same force again, while that of another one changes."""
     changes = [now - before if now != 0.0 and before != 0.0 else nan for now, before in zip(
         readings.foot_force.tolist(), last.foot_force.tolist(), strict=True)]
-    changing = any(abs(change) > 0.0 for change in changes)
-    return [changing and change == 0.0 for change in changes]
+    repeated = [change == 0.0 for change in changes]
+    if any(repeated) and not any(abs(change) > 0.0 for change in changes):
+        return [False] * N
+    return repeated
 
 
 def _without(readings: SensorReadings, imu: bool, legs: ArrayLike, contacts: ArrayLike

@@ -21,8 +21,6 @@ from __future__ import annotations
 from math import cos, exp, hypot, sqrt
 from typing import NamedTuple
 
-import numpy as np
-
 from dmp_cpg_ros.core.estimation.velocity_filter import TILT, VELOCITY, FilterState
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.records import replace_unchecked
@@ -144,7 +142,7 @@ class ImuWatch(NamedTuple):
         kept, slope = self.kept
         up, now = upward(kept.quaternion.tolist()), upward(state.quaternion.tolist())
         return replace_unchecked(
-            state, quaternion=turned(state.quaternion, np.array(cross(up, now))),
+            state, quaternion=turned(state.quaternion, cross(up, now)),
             gyro_bias=kept.gyro_bias, accelerometer_bias=kept.accelerometer_bias), slope
 
 

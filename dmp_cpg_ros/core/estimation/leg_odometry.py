@@ -295,7 +295,7 @@ def levelled_by_feet(quaternion: Array, terrain: TerrainState, share: float) -> 
     (x, y), (x_now, y_now) = terrain.slope, fitted_slope(terrain.foothold_in_world)
     turn = transposed_times(rotation(quaternion.tolist()),
                             (share * (y - y_now), share * (x_now - x), 0.0))
-    return turned(quaternion, np.array(turn))
+    return turned(quaternion, turn)
 
 
 def normal_in_world(slope: tuple[float, float]) -> Triple:

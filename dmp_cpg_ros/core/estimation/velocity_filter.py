@@ -49,10 +49,10 @@ def _places(rows: slice, columns: slice, diagonal: bool) -> tuple[int, ...]:
                  for i in range(3) for j in range(3) if (i == j) == diagonal)
 
 
-_TRANSITION = (
+_TRANSITION = np.array((
     *_places(TILT, TILT, False), *_places(VELOCITY, VELOCITY, False),
     *_places(VELOCITY, TILT, False), *_places(VELOCITY, GYRO_BIAS, False),
-    *_places(TILT, GYRO_BIAS, True), *_places(VELOCITY, ACCELEROMETER_BIAS, True))
+    *_places(TILT, GYRO_BIAS, True), *_places(VELOCITY, ACCELEROMETER_BIAS, True)))
 """Places in the transition's matrix of what is neither 0 nor 1, block by block."""
 
 
@@ -149,7 +149,7 @@ def predict(state: FilterState, rate: Array, specific_force: Array, dt: float,
     F = _IDENTITY if guessed else transition(v, up, turning, dt)
     P = F.dot(state.covariance).dot(F.T)
     P.ravel()[::13] += noise.spread * dt
-    return FilterState(turned(state.quaternion, np.array(turn)), velocity, state.gyro_bias,
+    return FilterState(turned(state.quaternion, turn), velocity, state.gyro_bias,
                        state.accelerometer_bias, P)
 
 
@@ -209,7 +209,7 @@ def update(state: FilterState, rate: Array, contact_in_base: Sequence[Triple],
     error = np.array((pull_x / total, pull_y / total, pull_z / total)).dot(KT)
     P = P - HP.T.dot(KT)
     return FilterState(
-        turned(state.quaternion, error[TILT]), state.velocity_in_base + error[VELOCITY],
+        turned(state.quaternion, error[TILT].tolist()), state.velocity_in_base + error[VELOCITY],
         state.gyro_bias + error[GYRO_BIAS], state.accelerometer_bias + error[ACCELEROMETER_BIAS],
         0.5 * (P + P.T)), tuple(distances)
 

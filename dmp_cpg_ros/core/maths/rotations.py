@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import asin, atan2, cos, sin, sqrt
 
 import numpy as np
@@ -11,14 +12,14 @@ import numpy as np
 from dmp_cpg_ros.core.maths import Array
 
 
-def turned(quaternion: Array, rotation_vector: Array) -> Array:
+def turned(quaternion: Array, rotation_vector: Iterable[float]) -> Array:
     """Turn a quaternion by a rotation vector in its own (the body's) frame: q ⊗ exp(φ/2).
 
     Parameters
     ----------
     quaternion : ndarray (4,)
         Of length 1.
-    rotation_vector : ndarray (3,)
+    rotation_vector : iterable of three floats
         φ, axis times angle [rad].
 
     Returns
@@ -27,7 +28,7 @@ def turned(quaternion: Array, rotation_vector: Array) -> Array:
         Of length 1.
     """
     x, y, z, w = quaternion.tolist()
-    a, b, c = rotation_vector.tolist()
+    a, b, c = rotation_vector
     angle = sqrt(a * a + b * b + c * c)
     scale = sin(0.5 * angle) / angle if angle > 1e-9 else 0.5
     a, b, c, d = a * scale, b * scale, c * scale, cos(0.5 * angle)
