@@ -45,7 +45,7 @@ from dmp_cpg_ros.core.reference.governor import Governor
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
-from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, LegTargets, RobotState
 from dmp_cpg_ros.core.suite_parameters import OWNER, SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.core.voting.voters import vote_sensors
@@ -184,13 +184,11 @@ class WalkingLoop:
                        dt: float) -> JointTargets:
         """Targets of all legs."""
         legs = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
-        columns = [leg.position for leg in legs] + [leg.velocity for leg in legs] + [
-            leg.effort for leg in legs]
-        every, count = np.concatenate(columns), len(JOINT_NAMES)
-        return JointTargets(every[:count], every[count:2 * count], every[2 * count:])
+        numbers = [number for row in range(3) for targets in legs for number in targets[row]]
+        return JointTargets(*np.array(numbers).reshape(3, -1))
 
     def _leg(self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback,
-             dt: float) -> JointTargets:
+             dt: float) -> LegTargets:
         canon = self.canon
         self.leg_states[i], targets = self.legs[i].step(
             self.leg_states[i], canon.gait, canon.x, x_dot, self.r, feedback,

@@ -23,7 +23,7 @@ from dmp_cpg_ros.core.clock import RESET_NS, fresh
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.parameters import Parameters, parameter, typed
-from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, LegTargets, RobotState
 from dmp_cpg_ros.core.robot_model.target_limits import TargetLimits
 from dmp_cpg_ros.nodes.framework.driven_robot import RETREATS, DrivenRobot
 from dmp_cpg_ros.nodes.framework.gaits import description_of
@@ -213,7 +213,7 @@ class Ros2ControlDriver(DrivenRobot):
         else:
             self.tell_drive(self._guard.fallback)
         asked = np.array((targets.position, targets.velocity, targets.effort)).reshape(3, 4, 3)
-        limited = [limits.limited(JointTargets(*asked[:, i]), None, 0.0)
+        limited = [limits.limited(LegTargets(*asked[:, i].tolist()), None, 0.0)
                    for i, limits in enumerate(self._limits)]
         values = {**self._gains, **{name: np.concatenate([getattr(leg, name) for leg in limited])
                                     for name in ('position', 'velocity', 'effort')}}

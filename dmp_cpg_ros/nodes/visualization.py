@@ -119,7 +119,7 @@ class Visualization(SuiteNode):
                                     feedback.of_leg(i))
                       for i, leg in enumerate(self._legs)]
         self._marker_publisher.publish(self._markers.fill(
-            stamp_ns, feet, feedback.foot_force, up, swings))
+            stamp_ns, feet, np.array(feedback.foot_force), up, swings))
         self.end_tick()
 
     def _follow(self, stamp_ns: int, motion: robot_state.BaseMotion) -> None:

@@ -81,13 +81,14 @@ def judge_joints(_: RobotDescription, case: Case, weaken: bool) -> Judged:
 
 def _spring(k: float, b: float, theta: Array, rate: float, dt: float, apart: Array) -> Judged:
     system = SpringDamper(np.array([k]), np.array([b]))
-    one, other = SpringState(np.zeros(1), np.zeros(1)), SpringState(apart[:1], apart[1:])
+    one, other = SpringState((0.0,), (0.0,)), SpringState(*((of,) for of in apart.tolist()))
     before, most = float(np.hypot(*(theta @ apart))), 0.0
     for tick in range(100):
-        goal, rate_of_goal = np.array([math.sin(tick)]), np.array([math.cos(3.0 * tick)])
+        goal, rate_of_goal = (math.sin(tick),), (math.cos(3.0 * tick),)
         one, other = (system.follow(state, goal, rate_of_goal, dt) for state in (one, other))
         now = float(np.hypot(*(theta @ np.concatenate(
-            [other.position - one.position, other.velocity - one.velocity]))))
+            [np.subtract(other.position, one.position),
+             np.subtract(other.velocity, one.velocity)]))))
         if before < 1e-6:
             break
         most, before = max(most, now / before / math.exp(-rate * dt)), now

@@ -233,7 +233,7 @@ def _walking(overrides: Mapping[str, object] | None = None) -> tuple[Suite, Loop
 def messages() -> list[Row]:
     """Reading and writing by the suite, rclpy and rosbags; and what one message more costs."""
     writer, reader = PostureFeedbackWriter(), PostureFeedbackReader()
-    feedback = PostureFeedback(np.ones(12), np.ones((4, 3)), np.ones((4, 2)), np.ones(3))
+    feedback = PostureFeedback((1.0,) * 12, ((1.0,) * 3,) * 4, ((1.0,) * 2,) * 4, (1.0,) * 3)
     data, read = writer.fill(0, feedback).serialized, serialized_reader(JointState)
     message, store = deserialize_message(data, JointState), get_typestore(Stores.ROS2_JAZZY)
     kind, twist_kind = (f'{of.__module__.split(".")[0]}/msg/{of.__name__}'

@@ -20,7 +20,7 @@ from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at
 from dmp_cpg_ros.core.loop import Array, Tick, WalkingLoop
 from dmp_cpg_ros.core.primitives.spring_damper import SpringState
-from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.state import LEGS, LegTargets, RobotState
 
 
 class FreezingLoop(WalkingLoop):
@@ -65,14 +65,16 @@ class FreezingLoop(WalkingLoop):
         return np.abs(gait.cycle_position(phase(self.x))) < 0.5 * (1.0 - duty)
 
     def _leg(self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback,
-             dt: float) -> JointTargets:
+             dt: float) -> LegTargets:
         """Targets of one leg: those of its primitive, or those that it froze with."""
         if self._frozen is None or not self._frozen[i]:
             return super()._leg(i, state, x_dot, feedback, dt)
         leg, joints, of_leg = self.legs[i].primitive, self.legs[i].joints, self.leg_states[i].leg
-        position, zero = of_leg.joints.position, np.zeros(3)
+        position, zero = of_leg.joints.position, (0.0,) * 3
         held = of_leg._replace(joints=SpringState(position, zero))
         self.leg_states[i] = self.leg_states[i]._replace(leg=held)
-        measured = SpringState(state.joint_position[joints], state.joint_velocity[joints]) \
-            if leg.parameters.reading == 'torque' else None
+        measured = None
+        if leg.parameters.reading == 'torque':
+            measured = SpringState(*(tuple(of[joints].tolist()) for of in (
+                state.joint_position, state.joint_velocity)))
         return leg.targets(held, position, zero, feedback.torque[joints], measured)

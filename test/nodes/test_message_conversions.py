@@ -27,7 +27,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.inhibition.blocked import Progress
-from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, LegTargets, RobotState
 from dmp_cpg_ros.nodes.messages.canonical_state import CanonicalStateReader
 from dmp_cpg_ros.nodes.messages.cdr import Serialized
 from dmp_cpg_ros.nodes.messages.commands import read_twist
@@ -122,10 +122,10 @@ def test_reference(r: np.ndarray) -> None:
 
 @given(st.sampled_from(LEGS), numbers(3, 3))
 def test_joint_targets(leg: str, values: np.ndarray) -> None:
-    sent = JointTargets(*values)
+    sent = LegTargets(*values)
     found, targets = JointTargetsReader().read(wire(JointTargetsWriter(leg).fill(0, sent)))
     assert found == leg
-    assert bits(*dataclasses.astuple(targets)) == bits(*dataclasses.astuple(sent))
+    assert bits(*dataclasses.astuple(targets)) == bits(*sent)
 
 
 @settings(max_examples=30)
@@ -284,7 +284,7 @@ def test_no_bad_number_leaves(bad: float) -> None:
     with pytest.raises(DataError, match='velocity'):
         canonical_writer().fill(0, np.zeros((4, 2)), x, load_gait('trot'))
     with pytest.raises(DataError, match='effort'):
-        JointTargetsWriter('fl').fill(0, JointTargets(np.zeros(3), np.zeros(3), np.full(3, bad)))
+        JointTargetsWriter('fl').fill(0, LegTargets(np.zeros(3), np.zeros(3), np.full(3, bad)))
     with pytest.raises(DataError, match='reference'):
         ReferenceWriter().fill(0, np.array([0.0, bad, 0.0]))
     for place in range(4, 59):

@@ -617,7 +617,7 @@ def test_a_leg_that_was_without_feedback_on_the_way_up_goes_on_from_where_its_jo
     leg.start()
     leg._writer.fill = lambda _, targets: sent.append(targets.position)
     leg._publisher.publish = str
-    high, low = tick.feedback.measured, tick.feedback.measured + 0.4
+    high, low = tick.feedback.measured, [angle + 0.4 for angle in tick.feedback.measured]
     leg.elapsed = 0.0
     for measured, age in ((high, 0), (high, 16 * TICK), (low, 0)):
         feedback = replace(tick.feedback, measured=measured, command=BodyCommand(

@@ -4,20 +4,18 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureFeedback, PostureState
 from dmp_cpg_ros.core.loop import WalkingLoop
-from dmp_cpg_ros.core.robot_model.state import JointTargets
+from dmp_cpg_ros.core.robot_model.state import LegTargets
 
-NO_TARGETS = JointTargets(np.zeros(3), np.zeros(3), np.zeros(3))
-NO_FEEDBACK = PostureFeedback(np.zeros(12), np.zeros((4, 3)), np.zeros((4, 2)), np.zeros(3))
+NO_TARGETS = LegTargets((0.0,) * 3, (0.0,) * 3, (0.0,) * 3)
+NO_FEEDBACK = PostureFeedback((0.0,) * 12, ((0.0,) * 3,) * 4, ((0.0,) * 2,) * 4, (0.0,) * 3)
 
 
 class LimblessLoop(WalkingLoop):
     """A walking loop without legs and balance, of which the rest knows nothing."""
 
-    def _leg(self, *_: object) -> JointTargets:
+    def _leg(self, *_: object) -> LegTargets:
         return NO_TARGETS
 
 

@@ -203,7 +203,8 @@ class PostureController:
         measured = (velocity[0], velocity[1] - sway.velocity, rate[2])
         under = lean(upward, self.model.height)
         beside = self._beside(under, plan, offset)
-        legs = self.legs.at(state.joint_position.tolist())
+        angles = state.joint_position.tolist()
+        legs = self.legs.at(angles)
         com = vec3.plus(self._com_in_base, (*offset.place, 0.0))
         feet = [vec3.times(R_ground_base, vec3.minus(foot, com)) for foot, _ in legs]
         body = BodyMotion(R_ground_base, upward, velocity, rate,
@@ -221,10 +222,10 @@ class PostureController:
             self._shift(stride, gait, plan.expected, measured, planned, turned_back(
                 beside, under, R_ground_base[2], self.model.height, terrain.rough),
                 across, R_ground_base, level if terrain.barred else LEVEL_FEET),
-            np.array(self.placement.drift(
+            self.placement.drift(
                 self.placement.yielding(p, stride.reference[0], gait.firm, plan.acceleration),
-                measured, planned, stride.activity, sway.velocity)),
-            np.array(correction), command, state.joint_position, forces,
+                measured, planned, stride.activity, sway.velocity),
+            correction, command, angles, forces,
             self._margins(R_ground_base, feet, stride, under, error),
             Progress((measured[0], measured[1]), feet_behind(
                 plan.expected, beside, feet, self._footholds, stride.positions, stride.duty,
@@ -265,8 +266,8 @@ class PostureController:
 
     def _shift(self, stride: Stride, gait: GaitInForce, expected: Pair, measured: Triple,
                planned: Triple, beside: Pair, across: Sequence[float], R_ground_base: Matrix,
-               level: Sequence[float]) -> Array:
-        """Shift of the footholds of swinging feet, to their levels, ndarray (4, 3) [m]."""
+               level: Sequence[float]) -> list[Triple]:
+        """Shift of the footholds of swinging feet, to their levels [m]."""
         p, (beside_x, beside_y) = self.parameters, beside
         caught = self.placement.caught(measured, planned, gait.apart)
         lanes = self.lanes.aside(
@@ -275,10 +276,9 @@ class PostureController:
             self.placement.shift(p, caught, planned, pi * stride.duty / stride.omega, across),
             lanes, strict=True)]
         raised = self.placement.raised(p, shift, R_ground_base)
-        return np.array([part for (x, y), up, e in zip(shift, raised, level, strict=True)
-                         for part in (x, y, up + e)]).reshape(-1, 3)
+        return [(x, y, up + e) for (x, y), up, e in zip(shift, raised, level, strict=True)]
 
-    def _ground(self, memory: PostureState, state: RobotState, forces: Array,
+    def _ground(self, memory: PostureState, state: RobotState, forces: Sequence[float],
                 R_world_base: Matrix, normal_in_base: Triple,
                 legs: Sequence[tuple[Triple, Matrix]], stride: Stride, gait: GaitInForce,
                 measured: Triple, dt: float) -> tuple[Terrain, tuple[float, ...]]:
@@ -332,8 +332,8 @@ class PostureController:
 
     def _torque(self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
                 stride: Stride, r: Triple, bounce: Bounce, acceleration: Pair,
-                empty: Sequence[bool]) -> Array:
-        """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
+                empty: Sequence[bool]) -> list[float]:
+        """Torques τ_fb (12) by which the stance feet make the virtual model's wrench."""
         force, moment = self.model.wrench(self.parameters, body, r, bounce, acceleration)
         forces = unfelt.borne_by_others(
             force, moment, feet, stride.load, empty, self.parameters.friction,
@@ -341,5 +341,5 @@ class PostureController:
         torques = [torque for on_foot, (_, J) in zip(forces, legs, strict=True)
                    for torque in vec3.transposed_times(
                        J, vec3.transposed_times(body.R_ground_base, on_foot))]
-        return np.array([clamped(-torque, -most, most) for torque, most in zip(
-            torques, self._torque_limit, strict=True)])
+        return [clamped(-torque, -most, most) for torque, most in zip(
+            torques, self._torque_limit, strict=True)]

@@ -4,18 +4,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import cached_property
-
-import numpy as np
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.capture_point import WIDE
 from dmp_cpg_ros.core.balance.terrain import LEVEL_FEET
 from dmp_cpg_ros.core.inhibition.blocked import Progress
-from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import made_often
-from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.maths.vec3 import Pair, Triple
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.core.transformation.leg import LegFeedback
 
 FELT = (True,) * len(LEGS)
@@ -24,23 +22,23 @@ FELT = (True,) * len(LEGS)
 @made_often
 @dataclass(frozen=True)
 class PostureFeedback:
-    """What the posture controller sends to the legs.
+    """What the posture controller sends to the legs, in numbers, for code that runs at every tick.
 
     Attributes
     ----------
-    torque : ndarray (12,)
+    torque : sequence of 12 floats
         τ_fb in the order of the joint names [N m].
-    shift_in_base : ndarray (4, 3)
+    shift_in_base : sequence of 4 tuples of 3 floats
         Foot placement shifts for swinging feet [m].
-    drift_in_base : ndarray (4, 2)
+    drift_in_base : sequence of 4 pairs of floats
         What standing feet add to the velocity of their paths [m/s].
-    correction : ndarray (3,)
+    correction : tuple of 3 floats
         What the legs add to the reference velocity of the stance feet: v_x, v_y [m/s], γ [rad/s].
     command : BodyCommand
         What the body does.
-    measured : ndarray (12,)
+    measured : sequence of 12 floats
         Measured joint angles that the feedback was made of [rad].
-    foot_force : ndarray (4,)
+    foot_force : sequence of 4 floats
         Measured normal forces of the feet [N]; 0 where there is none to be believed.
     felt : tuple of 4 bool
         Whose joints were measured; those of other legs are planned.
@@ -52,13 +50,13 @@ class PostureFeedback:
         How far over the plane that the body follows the feet are to stand [m].
     """
 
-    torque: Array
-    shift_in_base: Array
-    drift_in_base: Array
-    correction: Array
+    torque: Sequence[float]
+    shift_in_base: Sequence[Triple]
+    drift_in_base: Sequence[Pair]
+    correction: Triple
     command: BodyCommand = STANDING
-    measured: Array = field(default_factory=lambda: np.zeros(12))
-    foot_force: Array = field(default_factory=lambda: np.zeros(4))
+    measured: Sequence[float] = (0.0,) * len(JOINT_NAMES)
+    foot_force: Sequence[float] = (0.0,) * len(LEGS)
     margins: tuple[float, ...] = WIDE
     progress: Progress | None = None
     felt: tuple[bool, ...] = FELT
@@ -66,14 +64,7 @@ class PostureFeedback:
 
     def of_leg(self, i: int) -> LegFeedback:
         """What the path of leg ``i`` takes of it."""
-        measured, shift, drift, correction, force = self._numbers
         return LegFeedback(
-            measured[3 * i:3 * i + 3], shift[i], drift[i], correction, force[i], self.level[i],
+            self.measured[3 * i:3 * i + 3], self.shift_in_base[i], self.drift_in_base[i],
+            self.correction, self.foot_force[i], self.level[i],
             self.progress.rough if self.progress else 0.0)
-
-    @cached_property
-    def _numbers(self) -> tuple[list[float], list[list[float]], list[list[float]], list[float],
-                                list[float]]:
-        """What is told of the legs, as numbers: four legs ask in turn."""
-        return (self.measured.tolist(), self.shift_in_base.tolist(), self.drift_in_base.tolist(),
-                self.correction.tolist(), self.foot_force.tolist())

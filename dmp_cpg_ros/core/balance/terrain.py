@@ -60,7 +60,7 @@ from math import dist, exp
 from typing import NamedTuple
 
 from dmp_cpg_ros.core.gait.contact_feedback import LOADED, UNLOADED
-from dmp_cpg_ros.core.maths import Array, vec3
+from dmp_cpg_ros.core.maths import vec3
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, dot
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
@@ -305,7 +305,7 @@ class Terrain(NamedTuple):
         return tuple(lifted), tuple(changes), tuple(changed)
 
 
-def contacts(state: RobotState, forces: Array, rests: Sequence[bool],
+def contacts(state: RobotState, forces: Sequence[float], rests: Sequence[bool],
              legs: Sequence[tuple[Triple, Matrix]], quarter: float
              ) -> tuple[list[bool], list[bool]]:
     """Which feet touch something as their sensors tell, and which legs rest without a doubt of it:
@@ -315,7 +315,7 @@ def contacts(state: RobotState, forces: Array, rests: Sequence[bool],
     ----------
     state : RobotState
         Measured.
-    forces : ndarray (4,)
+    forces : sequence of four floats
         Of the feet, those that can be believed [N].
     rests : sequence of four bool
         Which legs rest; their feet touch with less than one that comes down.
@@ -324,9 +324,8 @@ def contacts(state: RobotState, forces: Array, rests: Sequence[bool],
     quarter : float
         A quarter of the robot's weight [N].
     """
-    known = forces.tolist()
     touches = [force > (UNLOADED if rest else LOADED) * quarter
-               for force, rest in zip(known, rests, strict=True)]
+               for force, rest in zip(forces, rests, strict=True)]
     if not any(rests):
         return touches, [*rests]
     told, efforts = state.foot_force.tolist(), state.joint_effort.tolist()
@@ -334,7 +333,7 @@ def contacts(state: RobotState, forces: Array, rests: Sequence[bool],
         rest and force == said and (touch or pressure(jacobian, efforts[3 * i:3 * i + 3])
                                     < LOADED * quarter)
         for i, (rest, force, said, touch, (_, jacobian)) in enumerate(
-            zip(rests, known, told, touches, legs, strict=True))]
+            zip(rests, forces, told, touches, legs, strict=True))]
 
 
 def pressure(jacobian: Matrix, efforts: Sequence[float]) -> float:

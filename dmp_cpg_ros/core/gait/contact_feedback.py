@@ -195,10 +195,9 @@ def quarter_weight(description: RobotDescription) -> float:
     return description.mass * GRAVITY / len(LEGS)
 
 
-def believed(force: Array) -> Array:
-    """Forces [N], (n,), with 0 for those that no contact sensor can have measured."""
-    return np.array([
-        value if -LARGEST_FORCE <= value <= LARGEST_FORCE else 0.0 for value in force.tolist()])
+def believed(force: Array) -> list[float]:
+    """Forces (n,) [N], with 0 for those that no contact sensor can have measured, as numbers."""
+    return [value if -LARGEST_FORCE <= value <= LARGEST_FORCE else 0.0 for value in force.tolist()]
 
 
 def standing(before: NDArray[np.bool_], force: Array, quarter: float) -> NDArray[np.bool_]:

@@ -15,6 +15,7 @@ Ijspeert et al. 2013).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -24,12 +25,11 @@ from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.modes.motion_library import BASES, Movements, learned, unit_movement
 from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive, DiscreteState
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, JointTargets
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LegTargets
 from dmp_cpg_ros.core.robot_model.target_limits import TargetLimits
 from dmp_cpg_ros.core.transformation.foot_path import Motion
 from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive, LegState
@@ -76,7 +76,8 @@ class LegMotion:
         self._paths: dict[str, DiscretePrimitive] = {}
 
     def step(self, motion: MotionState | None, leg: LegState, command: BodyCommand,
-             measured: Array, dt: float) -> tuple[MotionState | None, LegState, Array, Array]:
+             measured: Sequence[float], dt: float
+             ) -> tuple[MotionState | None, LegState, Sequence[float], Sequence[float]]:
         """Advance the leg in a mode in which the gait's primitive does not move it.
 
         Parameters
@@ -87,7 +88,7 @@ class LegMotion:
             State of the leg at the tick before.
         command : BodyCommand
             Mode of this tick.
-        measured : ndarray (3,)
+        measured : sequence of three floats
             Measured joint angles [rad].
         dt : float
             Time since the last tick [s]; 0 at the leg's first, which begins where its joints are.
@@ -96,7 +97,7 @@ class LegMotion:
         -------
         motion : MotionState or None
         leg : LegState
-        goal, goal_velocity : ndarray (3,)
+        goal, goal_velocity : sequence of three floats
             [rad], [rad/s]
 
         Raises
@@ -106,11 +107,12 @@ class LegMotion:
         """
         joints = leg.joints
         if command.mode == 'damped' or dt <= 0.0:
-            joints = SpringState(measured.copy(), np.zeros(len(measured)))
-        goal, goal_velocity = joints.position, np.zeros(len(measured))
+            joints = SpringState(tuple(measured), (0.0,) * len(measured))
+        goal, goal_velocity = joints.position, (0.0,) * len(measured)
         if command.movement:
             motion = self._moved(motion, joints, command, dt)
-            goal, goal_velocity = motion.state.position, motion.state.velocity
+            goal, goal_velocity = (
+                tuple(of.tolist()) for of in (motion.state.position, motion.state.velocity))
             joints = SpringState(goal, goal_velocity)
         else:
             motion = None
@@ -140,11 +142,11 @@ class LegMotion:
                 self._paths[movement.name] = learned(path)
             weights, begin = self._paths[movement.name].weights, path[0]
         primitive = replace(
-            unit, weights=weights - unit.weights * (joints.position - begin),
+            unit, weights=weights - unit.weights * (np.array(joints.position) - begin),
             transformation=replace(
                 spring, stiffness=spring.stiffness[0], damping=spring.damping[0]),
-            start=joints.position, goal=goal, start_velocity=0.0)
-        state = primitive.initial_state(velocity=joints.velocity, tau=movement.duration)
+            start=np.array(joints.position), goal=goal, start_velocity=0.0)
+        state = primitive.initial_state(velocity=np.array(joints.velocity), tau=movement.duration)
         return MotionState(
             command.movement, primitive, movement.duration, replace(state, x=command.x))
 
@@ -160,14 +162,14 @@ class LegControlState(NamedTuple):
         Movement under way.
     command : BodyCommand
         What the body did at the last tick.
-    targets : JointTargets or None
+    targets : LegTargets or None
         What was sent at the last tick.
     """
 
     leg: LegState
     motion: MotionState | None = None
     command: BodyCommand = STANDING
-    targets: JointTargets | None = None
+    targets: LegTargets | None = None
 
 
 class LegControl:
@@ -212,7 +214,7 @@ class LegControl:
     def step(
         self, state: LegControlState, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
         feedback: PostureFeedback, position: Array, velocity: Array, dt: float,
-    ) -> tuple[LegControlState, JointTargets]:
+    ) -> tuple[LegControlState, LegTargets]:
         """Advance the leg by one tick.
 
         Parameters
@@ -235,17 +237,16 @@ class LegControl:
         Returns
         -------
         state : LegControlState
-        targets : JointTargets
-            Of the leg's three joints.
+        targets : LegTargets
         """
         place, joints, command = self.primitive.place, self.joints, feedback.command
-        goal: Array | Triple
-        goal_velocity: Array | Triple
+        goal: Sequence[float]
+        goal_velocity: Sequence[float]
         if command.balanced:
             motion, told = None, feedback.of_leg(place)
             if not feedback.felt[place]:  # its foot is where it was told to be
                 told = told._replace(joint_position=(
-                    *state.leg.sent[1:], state.leg.joints.position)[0].tolist())
+                    *state.leg.sent[1:], state.leg.joints.position)[0])
             leg, goal, goal_velocity = self.primitive.step(
                 state.leg, gait, x[place], x_dot[place], r, told, dt)
         else:
@@ -253,7 +254,7 @@ class LegControl:
                 state.motion, state.leg, command, feedback.measured[joints], dt)
         measured = None
         if self.primitive.parameters.reading == 'torque':
-            measured = SpringState(position[joints], velocity[joints])
+            measured = SpringState(*(tuple(of[joints].tolist()) for of in (position, velocity)))
         targets = self.primitive.targets(
             leg, goal, goal_velocity, feedback.torque[joints], measured)
         # Targets that are what was measured follow the joints wherever those are.

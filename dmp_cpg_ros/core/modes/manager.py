@@ -156,9 +156,9 @@ class ModeManager:
     def feedback(self, mode: ModeState, state: RobotState) -> PostureFeedback:
         """What the legs get while the balance controller does not act."""
         state = self._as_moved(mode, state)
-        torque = self._sense.carrying_torque(state, self._carried(mode))
-        return PostureFeedback(torque, np.zeros((4, 3)), np.zeros((4, 2)), np.zeros(3),
-                               self.command(mode), state.joint_position.copy())
+        torque = self._sense.carrying_torque(state, self._carried(mode)).tolist()
+        return PostureFeedback(torque, ((0.0, 0.0, 0.0),) * 4, ((0.0, 0.0),) * 4, (0.0, 0.0, 0.0),
+                               self.command(mode), state.joint_position.tolist())
 
     def _as_moved(self, mode: ModeState, state: RobotState) -> RobotState:
         """State in which legs that are not felt are where the movement has them: a leg that begins

@@ -37,10 +37,10 @@ FORMS: tuple[Form, ...] = ('scaled', 'printed')
 @made_often
 @dataclass(frozen=True, eq=False)
 class SpringState:
-    """Positions y and velocities ẏ of n degrees of freedom, ndarray (n,) each."""
+    """Positions y and velocities ẏ of n degrees of freedom, in numbers, for every tick."""
 
-    position: Array
-    velocity: Array
+    position: tuple[float, ...]
+    velocity: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,8 +163,8 @@ class SpringDamper:
             grid.tau[0] * velocity, drives, grid.length)
         return y, z / grid.tau[-1]
 
-    def follow(self, state: SpringState, goal: Array | Sequence[float],
-               goal_velocity: Array | Sequence[float], dt: float) -> SpringState:
+    def follow(self, state: SpringState, goal: Sequence[float], goal_velocity: Sequence[float],
+               dt: float) -> SpringState:
         """Advance ÿ = k (g − y) + b (ġ − ẏ) to the time at which the goals hold (eq. 28).
 
         Exact for goals that move at ``goal_velocity`` during the step.
@@ -173,7 +173,7 @@ class SpringDamper:
         ----------
         state : SpringState
             State one step before.
-        goal, goal_velocity : ndarray (n,) or sequence of n floats
+        goal, goal_velocity : sequence of n floats
             Goals at the end of the step.
         dt : float
             [s]
@@ -184,12 +184,12 @@ class SpringDamper:
         """
         position, velocity = [], []
         for y, y_dot, at, rate, (a, b, c, d) in zip(
-                state.position.tolist(), state.velocity.tolist(), goal, goal_velocity,
-                self._propagator(dt)[1], strict=True):
+                state.position, state.velocity, goal, goal_velocity, self._propagator(dt)[1],
+                strict=True):
             error, error_rate = y - (at - rate * dt), y_dot - rate
             position.append(at + a * error + b * error_rate)
             velocity.append(rate + c * error + d * error_rate)
-        return SpringState(np.array(position), np.array(velocity))
+        return SpringState(tuple(position), tuple(velocity))
 
     def goals(self, position: Array, velocity: Array, dt: Array) -> Array:
         """Goals (m, n) at the ends of steps of dt (m,) [s] that states, ndarrays (m + 1, n), have

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan
+from typing import NamedTuple
 
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import made_often
@@ -89,10 +91,24 @@ class RobotState:
         return self.base_rate_in_base if self.gyro_in_base is None else self.gyro_in_base
 
 
+class LegTargets(NamedTuple):
+    """Targets of one leg's joints, in numbers, for code that runs for every leg at every tick.
+
+    Attributes
+    ----------
+    position, velocity, effort : sequence of 3 floats
+        As of :class:`JointTargets`.
+    """
+
+    position: Sequence[float]
+    velocity: Sequence[float]
+    effort: Sequence[float]
+
+
 @made_often
 @dataclass(frozen=True)
 class JointTargets:
-    """Targets for some joints; what a leg sends to the robot.
+    """Targets for some joints; what the legs send to the robot.
 
     Attributes
     ----------

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from dmp_cpg_ros.core.robot_model.description import LegGeometry
-from dmp_cpg_ros.core.robot_model.state import JointTargets
+from dmp_cpg_ros.core.robot_model.state import LegTargets
 
 
 class TargetLimits:
@@ -28,22 +28,21 @@ class TargetLimits:
             leg.position_lower, leg.position_upper, leg.velocity_limit, leg.torque_limit)),
             strict=True))
 
-    def limited(self, targets: JointTargets, last: JointTargets | None, dt: float) -> JointTargets:
+    def limited(self, targets: LegTargets, last: LegTargets | None, dt: float) -> LegTargets:
         """The targets, or the nearest that the joints can have; the same object where they can.
 
         Parameters
         ----------
-        targets : JointTargets
-            Arrays (3,); a number that is not finite stays so.
-        last : JointTargets or None
+        targets : LegTargets
+            A number that is not finite stays so.
+        last : LegTargets or None
             What was sent one tick before; after None there is no jump.
         dt : float
             Time since then [s].
         """
-        here = targets.position.tolist()
-        before, step = (last.position.tolist(), self._rate * dt) if last is not None else (here, 0)
+        before, step = (last.position, self._rate * dt) if last else (targets.position, 0.0)
         for (low, high, speed, torque), at, was, velocity, effort in zip(
-                self._each, here, before, targets.velocity.tolist(), targets.effort.tolist(),
+                self._each, targets.position, before, targets.velocity, targets.effort,
                 strict=True):
             if not (low <= at <= high and -speed <= velocity <= speed
                     and -torque <= effort <= torque
@@ -51,11 +50,11 @@ class TargetLimits:
                 break
         else:
             return targets
-        leg = self._leg
-        position, way = targets.position, step * leg.velocity_limit
-        if last is not None:
+        leg, (position, velocity, effort) = self._leg, np.array(targets)
+        way = step * leg.velocity_limit
+        if last:
             position = np.clip(position, last.position - way, last.position + way)
-        return JointTargets(
-            np.clip(position, leg.position_lower, leg.position_upper),
-            np.clip(targets.velocity, -leg.velocity_limit, leg.velocity_limit),
-            np.clip(targets.effort, -leg.torque_limit, leg.torque_limit))
+        return LegTargets(
+            np.clip(position, leg.position_lower, leg.position_upper).tolist(),
+            np.clip(velocity, -leg.velocity_limit, leg.velocity_limit).tolist(),
+            np.clip(effort, -leg.torque_limit, leg.torque_limit).tolist())

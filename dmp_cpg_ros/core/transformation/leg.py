@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
-from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
+from dmp_cpg_ros.core.robot_model.state import LEGS, LegTargets
 from dmp_cpg_ros.core.transformation import stumble as reflex
 from dmp_cpg_ros.core.transformation.foot_path import (
     FootMotion,
@@ -85,7 +85,7 @@ class LegState(NamedTuple):
     Attributes
     ----------
     joints : SpringState
-        θ, θ̇ of the kinematic reading, (3,) each.
+        θ, θ̇ of the kinematic reading, three each.
     activity : float
         Swing activity a in [0, 1].
     shift_in_base : tuple of float
@@ -94,7 +94,7 @@ class LegState(NamedTuple):
         What the stumbling reflex does.
     motion : object
         Of the foot's motion.
-    sent : tuple of ndarray (3,)
+    sent : tuple of tuples of three floats
         Angles that were sent, from those that act now on [rad].
     """
 
@@ -103,7 +103,7 @@ class LegState(NamedTuple):
     shift_in_base: Triple = (0.0, 0.0, 0.0)
     stumble: reflex.Stumble = reflex.Stumble()
     motion: Any = None
-    sent: tuple[Array, ...] = ()
+    sent: tuple[tuple[float, ...], ...] = ()
 
 
 Numbers = Sequence[float] | Array
@@ -180,18 +180,17 @@ class LegPrimitive:
 
     def initial_state(self) -> LegState:
         """State of a leg that stands at its foothold."""
-        q = self.kinematics.inverse(self.foothold_in_base)
-        return LegState(SpringState(q, np.zeros(3)), 0.0)
+        return LegState(SpringState(self.kinematics.angles(self._foothold), (0.0,) * 3), 0.0)
 
-    def picked_up(self, gait: GaitInForce, x: Array, x_dot: Array, r: Array, measured: Array
-                  ) -> LegState:
+    def picked_up(self, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
+                  measured: Sequence[float]) -> LegState:
         """State in the middle of a motion, from what is on the topics: the leg's oscillator (2,),
-        the reference (3,) and the measured angles (3,).
+        the reference (3,) and the three measured angles.
         """
         omega = gait.pace(r, self.scale)[2][self.place]
         rate = scalar_phase_rate(*x.tolist(), *x_dot.tolist()) + gait.rest_rate
         activity = activity_step(0.0, rate, omega, self.parameters.activity_rate, 10.0)
-        return LegState(SpringState(measured.copy(), np.zeros(3)), activity)
+        return LegState(SpringState(tuple(measured), (0.0,) * 3), activity)
 
     def step(self, state: LegState, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
              feedback: LegFeedback, dt: float) -> tuple[LegState, Triple, Triple]:
@@ -225,7 +224,7 @@ class LegPrimitive:
         rate = scalar_phase_rate(x_1, x_2, x_1_dot, x_2_dot) + gait.rest_rate
         phi, lead = scalar_phase(x_1, x_2), p.target_lead
         position = acts = gait.scalar_cycle_position(phi)
-        sent: tuple[Array, ...] = (state.joints.position,)
+        sent: tuple[tuple[float, ...], ...] = (state.joints.position,)
         if lead:
             position = gait.scalar_cycle_position(phi + lead * rate)
             ahead = round(lead / dt) if dt > 0.0 else 0
@@ -256,7 +255,7 @@ class LegPrimitive:
             self._foothold, v_x, v_y, gamma, omega, duty, activity * clearance, self.rolling)
 
     def _offset_rate(self, state: LegState, activity: float, path: FootPath,
-                     positions: tuple[float, float], acting: Array, path_velocity: Triple,
+                     positions: tuple[float, float], acting: Numbers, path_velocity: Triple,
                      feedback: LegFeedback, dt: float) -> tuple[Triple, reflex.Stumble]:
         """Rate of the foothold offset [m/s]: placement and stumbling reflex in swing, following
         the ground in stance. The foot is where the targets that act now and the first of the
@@ -288,33 +287,33 @@ class LegPrimitive:
         rate = self.offset_rates.in_swing(offset, placement, height, activity, dt)
         return reflex.compliant_offset_rate(stumble, rate, path_velocity, away), stumble
 
-    def targets(self, state: LegState, goal: Array | Triple, goal_velocity: Array | Triple,
-                feedback: Array, measured: SpringState | None = None) -> JointTargets:
+    def targets(self, state: LegState, goal: Sequence[float], goal_velocity: Sequence[float],
+                feedback: Sequence[float], measured: SpringState | None = None) -> LegTargets:
         """Joint targets of the parameters' reading.
 
         Parameters
         ----------
         state : LegState
             State after :meth:`step`.
-        goal, goal_velocity : ndarray (3,) or tuple of float
+        goal, goal_velocity : sequence of three floats
             Goals from :meth:`step`.
-        feedback : ndarray (3,)
+        feedback : sequence of three floats
             τ_fb [N m].
         measured : SpringState, optional
             Measured angles and velocities, needed for the torque reading.
 
         Returns
         -------
-        JointTargets
+        LegTargets
         """
         joints, p = state.joints if measured is None else measured, self.parameters
         stiffness, damping = p.stiffness, p.damping
         effort = [
             J * (stiffness * (g - y) - damping * (y_dot - g_dot)) + tau
             for J, y, y_dot, g, g_dot, tau in zip(
-                self._inertia, joints.position.tolist(), joints.velocity.tolist(), goal,
-                goal_velocity, feedback.tolist(), strict=True)]
-        return JointTargets(joints.position, joints.velocity, np.array(effort))
+                self._inertia, joints.position, joints.velocity, goal, goal_velocity, feedback,
+                strict=True)]
+        return LegTargets(joints.position, joints.velocity, effort)
 
 
 def body_scale(description: RobotDescription) -> BodyScale:

@@ -6,10 +6,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from std_msgs.msg import String
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, JointTargets
+from dmp_cpg_ros.core.robot_model.state import (
+    JOINT_NAMES,
+    JOINTS_OF_LEG,
+    LEGS,
+    JointTargets,
+    LegTargets,
+)
 from dmp_cpg_ros.nodes.messages import cdr
 from dmp_cpg_ros.nodes.messages.joint_states import AnyJoints, JointStateReader, JointStateWriter
 
@@ -30,9 +37,9 @@ class JointTargetsWriter:
         """Lay the message of a leg out."""
         self._writer = JointStateWriter(joints_of(leg, names))
 
-    def fill(self, time_ns: int, targets: JointTargets) -> cdr.SerializedJointState:
+    def fill(self, time_ns: int, targets: LegTargets) -> cdr.SerializedJointState:
         """Refill with the targets of the leg's joints; raises DataError."""
-        return self._writer.fill(time_ns, targets.position, targets.velocity, targets.effort)
+        return self._writer.fill(time_ns, *np.array(targets))
 
 
 class JointTargetsReader:

@@ -12,6 +12,7 @@ from dmp_cpg_ros.core.balance.body_command import MODES, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.inhibition.blocked import Progress
+from dmp_cpg_ros.core.maths.vec3 import triple
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.nodes.messages import cdr
 from dmp_cpg_ros.nodes.messages.joint_states import AnyJoints, JointStateReader, JointStateWriter
@@ -40,7 +41,7 @@ class PostureFeedbackWriter:
     def fill(self, time_ns: int, feedback: PostureFeedback) -> cdr.SerializedJointState:
         """Refill with a feedback; raises DataError when it is not finite."""
         self._position[_JOINTS] = feedback.measured
-        self._position[_FEET] = feedback.shift_in_base.reshape(-1)
+        self._position[_FEET].reshape(len(LEGS), 3)[:] = feedback.shift_in_base
         self._velocity[_FEET].reshape(len(LEGS), 3)[:, :2] = feedback.drift_in_base
         self._velocity[_BASE] = feedback.correction
         self._position[_MARGINS] = feedback.margins
@@ -64,11 +65,13 @@ class PostureFeedbackReader:
     def read(self, message: AnyJoints) -> PostureFeedback:
         """Read the feedback; raises DataError."""
         position, velocity, effort = self._reader.read(message)
+        shift, drift, force = (of[_FEET].reshape(len(LEGS), 3).tolist()
+                               for of in (position, velocity, effort))
         return PostureFeedback(
-            effort[_JOINTS], position[_FEET].reshape(len(LEGS), 3),
-            velocity[_FEET].reshape(len(LEGS), 3)[:, :2], velocity[_BASE],
-            self._command.of(position[_COMMAND], velocity[_COMMAND]), position[_JOINTS],
-            effort[_FEET].reshape(len(LEGS), 3)[:, 2], tuple(position[_MARGINS].tolist()),
+            effort[_JOINTS].tolist(), [triple(of_foot) for of_foot in shift],
+            [(x, y) for x, y, _ in drift], triple(velocity[_BASE].tolist()),
+            self._command.of(position[_COMMAND], velocity[_COMMAND]), position[_JOINTS].tolist(),
+            [normal for _, _, normal in force], tuple(position[_MARGINS].tolist()),
             _progress(position[_PROGRESS]), tuple(
                 felt > 0.0 for felt in position[_FELT].tolist()),
             tuple(position[_GROUND].tolist()))

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -123,11 +124,11 @@ def controller(**changes: object) -> PostureController:
     return PostureController(ROBOT, PostureParameters(**changes))  # type: ignore[arg-type]
 
 
-def forces_of(torque: np.ndarray) -> np.ndarray:
+def forces_of(torque: Sequence[float]) -> np.ndarray:
     """Forces of the ground on the feet that torques balance."""
     q = standing_state(ROBOT).joint_position.reshape(4, 3)
     return np.array([-np.linalg.solve(LegKinematics(leg).jacobian_in_base(a).T, t)
-                     for leg, a, t in zip(ROBOT.legs, q, torque.reshape(4, 3), strict=True)])
+                     for leg, a, t in zip(ROBOT.legs, q, np.reshape(torque, (4, 3)), strict=True)])
 
 
 @pytest.mark.parametrize('gait', GAITS)
@@ -137,7 +138,7 @@ def test_standing_still_the_feet_carry_the_weight_and_nothing_else(gait: str) ->
         of.initial_state(), standing_state(ROBOT), GAITS[gait], x, 0.0 * x, np.zeros(3), TICK)
     wrench = wrench_of(forces_of(feedback.torque), FEET)
     assert np.allclose(wrench, [0.0, 0.0, WEIGHT, 0.0, 0.0, 0.0], atol=0.01 * WEIGHT)
-    assert not feedback.shift_in_base.any() and not feedback.correction.any()
+    assert not np.any(feedback.shift_in_base) and not any(feedback.correction)
 
 
 @pytest.mark.parametrize('gait', GAITS)
@@ -210,7 +211,7 @@ def test_on_a_slope_parallel_to_it_the_feet_carry_the_weight(slope: tuple[float,
     assert (tangential <= of.parameters.friction * forces[:, 2] + 1e-9).all()
     # Swinging feet are placed downhill: slope times height of the centre of mass.
     downhill = -np.array(slope) / np.hypot(*slope)
-    assert ((feedback.shift_in_base[:, :2] @ downhill) > 0.15 * 0.2).all()
+    assert ((np.array(feedback.shift_in_base)[:, :2] @ downhill) > 0.15 * 0.2).all()
 
 
 @pytest.mark.parametrize('slope', [(0.25, 0.0), (-0.2, 0.0), (0.0, 0.2), (0.0, -0.3)])

@@ -284,7 +284,7 @@ def test_legs_posture_and_cadence_take_the_same_velocity(gait: object) -> None:
             leg.initial_state(), gait, x[1], x_dot[1], r, nothing, TICK)[1:]))  # type: ignore[arg-type]
         feedback = posture.step(
             posture.initial_state(), standing_state(ROBOT, 0), gait, x, x_dot, r, TICK)[1]  # type: ignore[arg-type]
-        torques.append([feedback.torque.sum(), feedback.shift_in_base.sum()])
+        torques.append([sum(feedback.torque), np.sum(feedback.shift_in_base)])
     assert np.allclose(*goals) and np.allclose(*torques)
 
 

@@ -357,7 +357,7 @@ def test_a_leg_that_begins_unfelt_in_a_movement_begins_where_the_movement_has_it
     feedback = machine.modes.feedback(machine.state, stale)
     anew = LegMotion(slice(9, 12), machine.modes.movements, LegPrimitive(
         'rr', ROBOT, LegParameters()).transformation)
-    _, leg, goal, _ = anew.step(None, LegState(SpringState(np.zeros(3), np.zeros(3)), 0.0),
+    _, leg, goal, _ = anew.step(None, LegState(SpringState((0.0,) * 3, (0.0,) * 3), 0.0),
                                 feedback.command, feedback.measured[9:], 0.0)
     here = path[round(share * (len(path) - 1)), 9:]
     assert np.abs(leg.joints.position - here).max() < 0.05

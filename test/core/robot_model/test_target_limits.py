@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.modes.leg_control import LegControl
 from dmp_cpg_ros.core.modes.motion_library import Movements
-from dmp_cpg_ros.core.robot_model.state import JointTargets
+from dmp_cpg_ros.core.robot_model.state import LegTargets
 from dmp_cpg_ros.core.robot_model.target_limits import TargetLimits
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
@@ -23,7 +23,7 @@ NUMBERS = st.lists(st.floats(-1e6, 1e6), min_size=3, max_size=3).map(np.array)
 RATE = 2.0
 
 
-def assert_within(targets: JointTargets, leg=LEG) -> None:
+def assert_within(targets: LegTargets, leg=LEG) -> None:
     assert (leg.position_lower <= targets.position).all()
     assert (targets.position <= leg.position_upper).all()
     assert (np.abs(targets.velocity) <= leg.velocity_limit).all()
@@ -34,9 +34,9 @@ def assert_within(targets: JointTargets, leg=LEG) -> None:
        st.floats(0.0, 0.1))
 def test_whatever_comes_in_the_limits_hold(position, velocity, effort, at, dt):
     before = LEG.position_lower + at * (LEG.position_upper - LEG.position_lower)
-    last = JointTargets(before, np.zeros(3), np.zeros(3))
+    last = LegTargets(before, np.zeros(3), np.zeros(3))
     limits = TargetLimits(LEG, RATE)
-    targets = limits.limited(JointTargets(position, velocity, effort), last, dt)
+    targets = limits.limited(LegTargets(position, velocity, effort), last, dt)
     assert_within(targets)
     jump = np.abs(targets.position - before)
     assert (jump <= RATE * LEG.velocity_limit * dt * (1.0 + 1e-12) + 1e-12).all()
@@ -44,17 +44,17 @@ def test_whatever_comes_in_the_limits_hold(position, velocity, effort, at, dt):
 
 
 def test_what_is_within_the_limits_passes_as_it_is():
-    targets = JointTargets(np.array([0.1, 0.5, -1.2]), np.full(3, 39.0), np.full(3, -16.9))
+    targets = LegTargets(np.array([0.1, 0.5, -1.2]), np.full(3, 39.0), np.full(3, -16.9))
     limits = TargetLimits(LEG, RATE)
     assert limits.limited(targets, None, 0.0) is targets
-    last = JointTargets(targets.position - 0.3, np.zeros(3), np.zeros(3))
+    last = LegTargets(np.subtract(targets.position, 0.3), np.zeros(3), np.zeros(3))
     assert limits.limited(targets, last, TICK) is targets
 
 
 @pytest.mark.parametrize('bad', [np.nan, np.inf])
 def test_what_is_not_finite_is_not_made_up(bad):
     """A message of it is refused later, where it is told."""
-    targets = JointTargets(np.full(3, bad), np.zeros(3), np.zeros(3))
+    targets = LegTargets(np.full(3, bad), np.zeros(3), np.zeros(3))
     limited = TargetLimits(LEG, RATE).limited(targets, None, TICK)
     assert np.isnan(limited.position).all() or (np.abs(limited.position) <= 2.6).all()
 
@@ -77,6 +77,6 @@ def test_a_leg_that_is_told_nonsense_keeps_its_limits():
             continue
         assert_within(targets, robot.legs[0])
         if before is not None:
-            jump = np.abs(targets.position - before) / TICK
+            jump = np.abs(np.subtract(targets.position, before)) / TICK
             assert (jump <= 2.0 * robot.legs[0].velocity_limit * (1.0 + 1e-9)).all()
         before = targets.position

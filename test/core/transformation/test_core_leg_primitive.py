@@ -125,7 +125,7 @@ def test_the_kinematic_reading_follows_the_goals_closely() -> None:
         x = state_at(omega * k * TICK)
         state, goal, _ = leg.step(state, gait, x, omega * phase_generator() @ x, r,
                                   asked(leg, state), TICK)
-        errors.append(np.abs(state.joints.position - goal).max())
+        errors.append(np.abs(np.subtract(state.joints.position, goal)).max())
     assert max(errors[250:]) < 0.03
 
 
