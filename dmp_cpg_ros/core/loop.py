@@ -118,7 +118,7 @@ class WalkingLoop:
         self.estimator = None if p.state_source.state_source != ESTIMATE else BodyEstimator(
             description, p.estimation, legs)
         self.body = BodyControl(description, p.posture, p.mode, legs)
-        self.legs = [LegControl(leg, description, p.leg, self.body.modes.movements, p.motion)
+        self.legs = [LegControl(leg, description, p.leg, self.body.modes.movements, p.motion, legs)
                      for leg in LEGS]
         self._clock, self._dt = TickClock(), 0.004
         self.r = np.zeros(3)

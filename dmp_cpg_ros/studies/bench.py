@@ -134,7 +134,7 @@ def parts_of_a_tick() -> list[Row]:
     estimator = BodyEstimator(robot.description, suite.parameters.estimation)
     known, readings = loop.estimator_state, readings_of(state)
     balance, of_leg = loop.posture.balance, loop.leg_states[0].leg
-    asked = LegFeedback(state.joint_position[:3], zero, zero[:2], zero)
+    asked = LegFeedback(state.joint_position[:3].tolist(), (0.0,) * 3, (0.0,) * 2, (0.0,) * 3)
 
     return _with_ratios([
         # of a robot that walks: one whose state repeats itself has sensors that froze

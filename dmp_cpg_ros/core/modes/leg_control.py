@@ -29,6 +29,7 @@ from dmp_cpg_ros.core.modes.motion_library import BASES, Movements, learned, uni
 from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive, DiscreteState
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LegTargets
 from dmp_cpg_ros.core.robot_model.target_limits import TargetLimits
 from dmp_cpg_ros.core.transformation.foot_path import Motion
@@ -187,12 +188,15 @@ class LegControl:
         The robot's movements.
     motion : Motion, optional
         Where the path of the foot comes from; the foot path without.
+    legs : RobotLegs, optional
+        The robot's legs, where others ask them too.
     """
 
     def __init__(self, leg: str, description: RobotDescription, parameters: LegParameters,
-                 movements: Movements, motion: Motion | None = None) -> None:
+                 movements: Movements, motion: Motion | None = None,
+                 legs: RobotLegs | None = None) -> None:
         """Build both primitives around one transformation system."""
-        self.primitive = LegPrimitive(leg, description, parameters, motion)
+        self.primitive = LegPrimitive(leg, description, parameters, motion, legs)
         count = len(JOINTS_OF_LEG)
         self.joints = slice(count * self.primitive.place, count * (self.primitive.place + 1))
         self._limits = TargetLimits(description.legs[self.primitive.place], parameters.target_rate)

@@ -161,8 +161,8 @@ def _wrapped(angle: float) -> float:
 class RobotLegs:
     """Feet and Jacobians of all legs of a robot; those of the last joint angles are kept.
 
-    Estimator, sense of the body and posture controller ask for the same measured angles in turn,
-    so they share one of these.
+    Estimator, sense of the body, posture controller and legs ask for the same measured angles in
+    turn, so they share one of these.
 
     Parameters
     ----------
@@ -199,3 +199,8 @@ class RobotLegs:
             self._found = tuple(leg.foot_and_jacobian(q[3 * i:3 * i + 3])
                                 for i, leg in enumerate(self.kinematics))
         return self._found
+
+    def foot(self, i: int, q: Sequence[float]) -> Triple:
+        """Foot of leg ``i`` in the base at its three joint angles [rad], as of :meth:`at`."""
+        known = q == self._at[3 * i:3 * i + 3]
+        return self._found[i][0] if known else self.kinematics[i].foot(q)

@@ -20,11 +20,11 @@ from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.contact_feedback import LOADED, quarter_weight
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.vec3 import Triple, damped_solution, minus, moved, pair, plus, triple
+from dmp_cpg_ros.core.maths.vec3 import Pair, Triple, damped_solution, minus, moved, plus, triple
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics, RobotLegs
 from dmp_cpg_ros.core.robot_model.state import LEGS, LegTargets
 from dmp_cpg_ros.core.transformation import stumble as reflex
 from dmp_cpg_ros.core.transformation.foot_path import (
@@ -106,10 +106,6 @@ class LegState(NamedTuple):
     sent: tuple[tuple[float, ...], ...] = ()
 
 
-Numbers = Sequence[float] | Array
-"""A few numbers, an array of them where nobody is in a hurry."""
-
-
 class LegFeedback(NamedTuple):
     """The part of the body's feedback that one leg's path takes.
 
@@ -117,11 +113,11 @@ class LegFeedback(NamedTuple):
     ----------
     joint_position : sequence of 3 floats
         Measured angles [rad].
-    shift_in_base : sequence of 3 floats
+    shift_in_base : tuple of 3 floats
         Wanted foot placement shift, for a swinging foot [m].
-    drift_in_base : sequence of 2 floats
+    drift_in_base : pair of floats
         Added to the velocity of a standing foot [m/s].
-    correction : sequence of 3 floats
+    correction : tuple of 3 floats
         Added to the reference for the stance velocity, not the cadence [m/s], [m/s], [rad/s].
     foot_force : float
         Measured normal force of the foot [N]; 0 without a contact sensor.
@@ -131,10 +127,10 @@ class LegFeedback(NamedTuple):
         Height of what the feet are to be lifted over [m]; 0 on even ground.
     """
 
-    joint_position: Numbers
-    shift_in_base: Numbers
-    drift_in_base: Numbers
-    correction: Numbers
+    joint_position: Sequence[float]
+    shift_in_base: Triple
+    drift_in_base: Pair
+    correction: Triple
     foot_force: float = 0.0
     level: float = 0.0
     rough: float = 0.0
@@ -154,16 +150,19 @@ class LegPrimitive:
     motion : Motion, optional
         Where the path of the foot comes from; the
         :class:`~dmp_cpg_ros.core.transformation.foot_path.FootPath` itself without.
+    legs : RobotLegs, optional
+        The robot's legs, where others ask them too.
     """
 
     def __init__(self, leg: str, description: RobotDescription, parameters: LegParameters,
-                 motion: Motion | None = None) -> None:
+                 motion: Motion | None = None, legs: RobotLegs | None = None) -> None:
         """Derive foothold and scale from the description."""
         self.motion: FootMotion = (
             HermiteMotion() if motion is None else motion.of_leg(leg, description))
         self.parameters, self.place = parameters, LEGS.index(leg)
         geometry = description.legs[self.place]
-        self.kinematics = LegKinematics(geometry)
+        self._legs = legs or RobotLegs(description)
+        self.kinematics = self._legs.kinematics[self.place]
         self.scale = body_scale(description)
         self.foothold_in_base = nominal_foothold(description, leg)
         self._foothold = triple(self.foothold_in_base.tolist())
@@ -248,15 +247,15 @@ class LegPrimitive:
     def path(self, reference: Triple, omega: float, duty: float, activity: float,
              stumble: reflex.Stumble, feedback: LegFeedback) -> FootPath:
         """Path of the foot for the corrected reference, higher over what was felt."""
-        v_x, v_y, gamma = plus(reference, triple(feedback.correction))
+        v_x, v_y, gamma = plus(reference, feedback.correction)
         clearance = reflex.swing_clearance(
             self.clearance, self.stumble_lift, stumble, feedback.rough, self.scale.leg_length)
         return FootPath(
             self._foothold, v_x, v_y, gamma, omega, duty, activity * clearance, self.rolling)
 
-    def _offset_rate(self, state: LegState, activity: float, path: FootPath,
-                     positions: tuple[float, float], acting: Numbers, path_velocity: Triple,
-                     feedback: LegFeedback, dt: float) -> tuple[Triple, reflex.Stumble]:
+    def _offset_rate(self, state: LegState, activity: float, path: FootPath, positions: Pair,
+                     acting: Sequence[float], path_velocity: Triple, feedback: LegFeedback,
+                     dt: float) -> tuple[Triple, reflex.Stumble]:
         """Rate of the foothold offset [m/s]: placement and stumbling reflex in swing, following
         the ground in stance. The foot is where the targets that act now and the first of the
         positions in the cycle have it; its offset is for the second.
@@ -266,8 +265,8 @@ class LegPrimitive:
         edge, (now, then) = 0.5 * (1.0 - path.duty), positions
         stands, will_stand = abs(now) >= edge, abs(then) >= edge or (
             feedback.level != 0.0 and resting(activity, state.activity))
-        measured, target = self.kinematics.foot(feedback.joint_position), self.kinematics.foot(
-            acting)
+        measured = self._legs.foot(self.place, feedback.joint_position)
+        target = self.kinematics.foot(acting)
         away, offset = minus(measured, target), state.shift_in_base
         lift, progress = reflex.lift_left(
             self.stumble_lift, path, feedback.rough, self.scale.leg_length), None
@@ -278,13 +277,11 @@ class LegPrimitive:
             state.stumble, progress, lift if stands else activity * lift, self.stumble_lag,
             dt, feedback.rough > 0.0)
         if will_stand:
-            drift = pair(feedback.drift_in_base)
             slipped = away[:2] if stands else (0.0, 0.0)
-            return self.offset_rates.in_stance(
-                offset, drift, slipped, activity, dt, feedback.level), stumble
-        placement = triple(feedback.shift_in_base)
+            return self.offset_rates.in_stance(offset, feedback.drift_in_base, slipped, activity,
+                                               dt, feedback.level), stumble
         height, _ = swing_height(path.swung(then))
-        rate = self.offset_rates.in_swing(offset, placement, height, activity, dt)
+        rate = self.offset_rates.in_swing(offset, feedback.shift_in_base, height, activity, dt)
         return reflex.compliant_offset_rate(stumble, rate, path_velocity, away), stumble
 
     def targets(self, state: LegState, goal: Sequence[float], goal_velocity: Sequence[float],

@@ -274,7 +274,7 @@ def test_legs_posture_and_cadence_take_the_same_velocity(gait: object) -> None:
     assert np.allclose(*([gait.omega(u, SCALE), gait.duty(u, SCALE)] for u in speeds))  # type: ignore[attr-defined]
     x = state_at(gait.phases + 0.7, 1.0)  # type: ignore[attr-defined]
     x_dot = 12.0 * x[:, ::-1] * [1.0, -1.0]
-    nothing = LegFeedback(np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(3))
+    nothing = LegFeedback((0.0,) * 3, (0.0,) * 3, (0.0,) * 2, (0.0,) * 3)
     leg = LegPrimitive('fr', ROBOT, LegParameters())
     posture = PostureController(ROBOT, PostureParameters())
     goals, torques = [], []

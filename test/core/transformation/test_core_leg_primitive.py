@@ -34,10 +34,10 @@ def leg_of(leg: str, **changes: object) -> LegPrimitive:
 
 def asked(leg: LegPrimitive, state: LegState, shift: np.ndarray | None = None) -> LegFeedback:
     """Feedback for a leg whose joints are at their targets, those that act now."""
-    shift = np.zeros(3) if shift is None else shift
+    shift = (0.0,) * 3 if shift is None else shift
     sent = (*state.sent, state.joints.position)
     acts = sent[-1 - round(leg.parameters.target_lead / TICK):][0]
-    return LegFeedback(acts, shift, np.zeros(2), np.zeros(3))
+    return LegFeedback(acts, shift, (0.0,) * 2, (0.0,) * 3)
 
 
 def walked(leg: LegPrimitive, gait: Gait, r: np.ndarray, shift: np.ndarray, seconds: float
@@ -161,7 +161,7 @@ def test_a_swinging_foot_is_shown_going_to_where_it_will_stand(leg: str, directi
     for tick in (landings[-1] - 20, landings[-1] - 6):
         assert swings[tick]
         x, feedback = state_at(omega * tick * TICK), LegFeedback(
-            goals[tick], shift, still, np.zeros(3))
+            goals[tick].tolist(), shift, still, (0.0,) * 3)
         x_dot = omega * phase_generator() @ x
         way = rest_of_swing(primitive, gait, x, x_dot, r, feedback)
         assert way is not None

@@ -51,7 +51,7 @@ def test_a_yielding_foot_stays_where_it_is_in_the_world(excess: list[float]) -> 
     drift, moved, places = -e, np.zeros(2), []
     for k in range(600):
         x = state_at(omega * k * dt)
-        asked = LegFeedback(state.joints.position, np.zeros(3), drift, np.zeros(3))
+        asked = LegFeedback(state.joints.position, (0.0,) * 3, drift, (0.0,) * 3)
         state, goal, _ = leg.step(state, gait, x, omega * phase_generator() @ x, r, asked, dt)
         moved = moved + dt * (r[:2] * leg.rolling[0] + e)
         foot = leg.kinematics.foot_in_base(goal)

@@ -189,8 +189,8 @@ def test_the_leg_feels_an_obstacle_by_its_joints(blocked: bool) -> None:
             free_way = foot[0] < leg.foothold_in_base[0]  # a wall stands below the hip
             wall = leg.foothold_in_base[0] if free_way else wall - r[0] * TICK
             foot[0] = min(foot[0], wall)
-            measured = leg.kinematics.inverse(foot)
-        feedback = LegFeedback(measured, np.zeros(3), np.zeros(2), np.zeros(3))
+            measured = leg.kinematics.angles(foot)
+        feedback = LegFeedback(measured, (0.0,) * 3, (0.0,) * 2, (0.0,) * 3)
         state, goal, _ = leg.step(state, TROT, x, x_dot, r, feedback, TICK)
         state_0, goal_0, _ = without.step(state_0, TROT, x, x_dot, r, feedback, TICK)
         if not blocked:
@@ -212,8 +212,8 @@ def landing_tick(force: float) -> int:
         foot = np.array(leg.kinematics.foot(state.joints.position))
         stands = k > 150 and foot[2] < high
         foot[2] = high if stands else foot[2]
-        feedback = LegFeedback(leg.kinematics.inverse(foot), np.zeros(3), np.zeros(2),
-                               np.zeros(3), force * stands)
+        feedback = LegFeedback(leg.kinematics.angles(foot), (0.0,) * 3, (0.0,) * 2,
+                               (0.0,) * 3, force * stands)
         state, _, _ = leg.step(state, TROT, x, omega * np.array((x[1], -x[0])), r, feedback, TICK)
         if state.stumble.landed:
             return k
