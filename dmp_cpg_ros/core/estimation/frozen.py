@@ -161,7 +161,8 @@ def without_frozen(watch: SensorWatch, readings: SensorReadings, weight: float
     """Readings in which those of sensors that freeze, jump or pull are missing (NaN), of a robot
     with a weight [N].
     """
-    last, heard, jumps = watch.readings, watch.heard_ns, dict[int, float]()
+    last, heard = watch.readings, watch.heard_ns
+    jumps: dict[int, float] = {}
     if readings.joints_ns >= last.joints_ns:
         heard, jumps = _heard(watch, readings)
     else:  # newer ones have been used already

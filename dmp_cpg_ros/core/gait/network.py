@@ -296,16 +296,14 @@ class GaitNetwork:
         held = np.array_equal(inhibition.acting_gains(x, system.target), gains)
         return x if held and np.abs(self.rate(x, r, inhibition)).max() <= AT_REST else None
 
-    def phase_errors(self, x: Array) -> Array:
-        """Deviation of each leg's phase from its place, relative to the circular mean, ndarray
-        (4,) [rad].
-        """
+    def phase_errors(self, x: Array) -> list[float]:
+        """Deviation of each leg's phase from its place, relative to the circular mean [rad]."""
         places = self.gait.phases.tolist()
         relative = [
             scalar_phase(x_1, x_2) - place
             for (x_1, x_2), place in zip(x.tolist(), places, strict=True)]
         mean = atan2(sum(map(sin, relative)), sum(map(cos, relative)))
-        return np.array([(angle - mean + pi) % (2.0 * pi) - pi for angle in relative])
+        return [(angle - mean + pi) % (2.0 * pi) - pi for angle in relative]
 
 
 def _turned(x: Array, phases: Array | None) -> Array:

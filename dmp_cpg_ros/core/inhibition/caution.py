@@ -135,8 +135,10 @@ def changing_share(network: GaitNetwork, changing: Changing, command: tuple[floa
         Foot speed of the reference [m/s].
     """
     (wanted, chosen), scale = changing, network.scale
+    if network.gait.name == wanted.name:
+        return 1.0
     most = scale.speed(changing_speed(network.gait, wanted, scale))
     asked = wanted.limiting_speed(command, scale)
-    if network.gait.name == wanted.name or asked <= most:
+    if asked <= most:
         return 1.0
     return min(1.0, max(most / asked, speed / scale.foot_speed(*command) if chosen else 0.0))

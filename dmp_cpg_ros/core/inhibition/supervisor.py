@@ -192,7 +192,7 @@ class GaitSupervisor:
         if state.requested:  # until it acts the reference may speed up
             return (replace_unchecked(state, armed=False, state='waiting') if quick or not acts
                     else self._stopping(state, network, x, rates, speed))
-        return self._running(state, network.phase_errors(x), speed)
+        return self._running(state, max(map(abs, network.phase_errors(x))), speed)
 
     def _balancing(self, state: SupervisorState, margins: Sequence[float] | None,
                    network: GaitNetwork, progress: Progress, r: Array, most: float, dt: float
@@ -332,8 +332,8 @@ class GaitSupervisor:
         """Whether legs and radii are as close to their places as capture requires."""
         return in_places(network, x, self.parameters.region_radius)
 
-    def _running(self, state: SupervisorState, errors: Array, speed: float) -> SupervisorState:
-        in_step = max(map(abs, errors.tolist())) <= LOCKED_PHASE_ERROR
+    def _running(self, state: SupervisorState, error: float, speed: float) -> SupervisorState:
+        in_step = error <= LOCKED_PHASE_ERROR
         swinging = min(state.activity)
         if state.state == 'releasing' and not (in_step and swinging >= LOCKED_ACTIVITY):
             return state

@@ -23,7 +23,7 @@ from dmp_cpg_ros.core.clock import carried
 from dmp_cpg_ros.core.maths import Array, clamped
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.records import made_often
-from dmp_cpg_ros.core.maths.vec3 import dot, upward
+from dmp_cpg_ros.core.maths.vec3 import Triple, dot, upward
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
@@ -59,7 +59,7 @@ class BodyCondition:
 
     Attributes
     ----------
-    down_in_base : ndarray (3,)
+    down_in_base : tuple of 3 floats
         Direction of gravity seen in ``base_link``; (0, 0, −1) when level.
     tilt : float
         Angle between the base's z and the vertical [rad].
@@ -74,7 +74,7 @@ class BodyCondition:
         the joint torques, negative where these pull.
     """
 
-    down_in_base: Array
+    down_in_base: Triple
     tilt: float
     height: float
     support: float
@@ -103,11 +103,10 @@ class BodySense:
     def condition(self, state: RobotState) -> BodyCondition:
         """Condition in a measured state."""
         x, y, z = upward(state.base_quaternion.tolist())
-        towards, height = (-x, -y, -z), -inf
-        legs, down = self._legs.at(state.joint_position.tolist()), np.array(towards)
-        for (foot, _), radius in zip(legs, self._radius, strict=True):
-            height = max(height, dot(towards, foot) + radius)
-        support = sum(force for force in state.foot_force.tolist() if force == force)  # no NaN
+        down, legs = (-x, -y, -z), self._legs.at(state.joint_position.tolist())
+        height = max(-inf, *[dot(down, foot) + radius
+                             for (foot, _), radius in zip(legs, self._radius, strict=True)])
+        support = sum([force for force in state.foot_force.tolist() if force == force])  # no NaN
         support /= self._weight
         if support < CERTAIN_SUPPORT:
             support = max(support, self._pressed(state, down))
@@ -116,13 +115,13 @@ class BodySense:
             told = np.where(np.isnan(state.foot_force), 0.25 * self._weight, state.foot_force)
             load = (float(told.sum()) / self._weight,
                     float(self._pressing(state, down).sum()) / self._weight)
-        return BodyCondition(down, acos(clamped(-towards[2], -1.0, 1.0)), height, support, load)
+        return BodyCondition(down, acos(clamped(-down[2], -1.0, 1.0)), height, support, load)
 
-    def _pressed(self, state: RobotState, down: Array) -> float:
+    def _pressed(self, state: RobotState, down: Triple) -> float:
         """Share of the weight that the joint torques press onto the ground."""
         return float(np.maximum(self._pressing(state, down), 0.0).sum()) / self._weight
 
-    def _pressing(self, state: RobotState, down: Array) -> Array:
+    def _pressing(self, state: RobotState, down: Triple) -> Array:
         """Forces (4,) with which the joint torques press each foot downwards [N].
 
         They are those of statics, f = −J⁻ᵀ τ at each foot, damped near singular postures.
@@ -131,7 +130,7 @@ class BodySense:
         tau = state.joint_effort.reshape(4, 3, 1)
         damped = J @ J.transpose(0, 2, 1) + 1e-4 * np.eye(3)
         forces = -np.linalg.solve(damped, J @ tau)[:, :, 0]
-        return np.asarray(-(forces @ down))
+        return np.asarray(-(forces @ np.array(down)))
 
     def carrying_torque(self, state: RobotState, share: float) -> Array:
         """Joint torques (12,) with which the feet carry a share of the weight [N m].

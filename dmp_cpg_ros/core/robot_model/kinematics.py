@@ -138,7 +138,7 @@ class LegKinematics:
                 self._s[2] * _wrapped(knee - self._shank_angle + self._thigh_angle))
 
     def _chain(self, q: Array | Sequence[float]) -> tuple[float, ...]:
-        q0, q1, q2 = q.tolist() if isinstance(q, np.ndarray) else q
+        q0, q1, q2 = q
         sign_0, sign_1, sign_2 = self._s
         t_x, _, t_z = self._t
         c_x, _, c_z = self._c

@@ -33,10 +33,10 @@ from dmp_cpg_ros.layouts import MODE_ROWS, MOVEMENT_ROWS, command_rows, read_com
 
 ROBOT = quadruped()
 HEIGHT = ROBOT.stance_height
-UPRIGHT = BodyCondition(np.array((0.0, 0.0, -1.0)), 0.0, HEIGHT, 1.0)
+UPRIGHT = BodyCondition((0.0, 0.0, -1.0), 0.0, HEIGHT, 1.0)
 FOLDED = replace(UPRIGHT, height=0.05, support=0.0)
-LEFT = BodyCondition(np.array((0.0, 1.0, 0.0)), math.pi / 2.0, 0.1, 0.0)
-BACK = BodyCondition(np.array((0.0, -0.1, 0.995)), 3.0, 0.1, 0.0)
+LEFT = BodyCondition((0.0, 1.0, 0.0), math.pi / 2.0, 0.1, 0.0)
+BACK = BodyCondition((0.0, -0.1, 0.995), 3.0, 0.1, 0.0)
 
 
 class Machine:
@@ -65,7 +65,7 @@ class Machine:
 @pytest.mark.parametrize('mode', ['standing', 'lying', 'damped'])
 @pytest.mark.parametrize('tilt', [0.0, 0.45, 0.55, 0.9, 1.5])
 def test_whatever_lies_gets_up_by_one_of_the_services(mode: str, tilt: float) -> None:
-    down = BodyCondition(np.array((0.0, math.sin(tilt), -math.cos(tilt))), tilt, 0.05, 0.0)
+    down = BodyCondition((0.0, math.sin(tilt), -math.cos(tilt)), tilt, 0.05, 0.0)
     machine = Machine(mode)
     if mode == 'standing':
         machine.go(0.1).ask('lie_down')
