@@ -42,6 +42,9 @@ class Oscillators(Protocol):
 
 _GENERATOR, _UNIT = phase_generator(), np.eye(2)
 
+FEW = 16
+"""Numbers up to which an array is worked on as plain floats."""
+
 
 @dataclass(frozen=True)
 class AndronovHopf:
@@ -84,14 +87,20 @@ class AndronovHopf:
         ndarray (..., 2)
             ẋ [1/s].
         """
-        squared = x * x
-        at_origin = self.rho * self.radius**2
-        damping = self.rho * (squared[..., 0] + squared[..., 1])
-        if x.dtype.kind == 'c':  # a step of a derivative: x₁ and x₂ are no parts of one number
-            turning = np.asarray(omega)[..., None] * (x @ phase_generator().T)
-            return np.asarray(turning + (at_origin - damping)[..., None] * x)
-        growth = np.empty(damping.shape, complex)  # filled, for NumPy is slow where types mix
-        growth.real, growth.imag = at_origin - damping, 0.0 - omega
+        rho, at_origin = self.rho, self.rho * self.radius**2
+        if (x.size <= FEW and x.ndim == 2 and x.dtype.char == 'd'
+                and isinstance(omega, float) and isinstance(at_origin, float)):
+            # so few numbers are read and written in less time than NumPy needs to begin
+            growth = np.array([complex(at_origin - rho * (x_1 * x_1 + x_2 * x_2), 0.0 - omega)
+                               for x_1, x_2 in x.tolist()])
+        else:
+            squared = x * x
+            damping = rho * (squared[..., 0] + squared[..., 1])
+            if x.dtype.kind == 'c':  # a step of a derivative: x₁, x₂ are no parts of one number
+                turning = np.asarray(omega)[..., None] * (x @ phase_generator().T)
+                return np.asarray(turning + (at_origin - damping)[..., None] * x)
+            growth = np.empty(damping.shape, complex)  # filled, for NumPy is slow where types mix
+            growth.real, growth.imag = at_origin - damping, 0.0 - omega
         return (growth[..., None] * np.ascontiguousarray(x, dtype=float).view(complex)).view(float)
 
     def jacobian(self, x: Array, omega: float | Array) -> Array:

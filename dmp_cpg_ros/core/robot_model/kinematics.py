@@ -50,6 +50,8 @@ class LegKinematics:
         self.shank_length = hypot(self._c[0], self._c[2])
         self._thigh_angle = atan2(-self._t[0], -self._t[2])  # about +y, from straight down
         self._shank_angle = atan2(-self._c[0], -self._c[2])
+        self._chain_of = (*self._s, self._t[0], self._t[2], self._c[0], self._c[2],
+                          self._o[0], self._o[2], self.lateral_offset)
         self._reach = (abs(self.thigh_length - self.shank_length) + 1e-3,
                        self.thigh_length + self.shank_length - 1e-3)
 
@@ -139,9 +141,7 @@ class LegKinematics:
 
     def _chain(self, q: Array | Sequence[float]) -> tuple[float, ...]:
         q0, q1, q2 = q
-        sign_0, sign_1, sign_2 = self._s
-        t_x, _, t_z = self._t
-        c_x, _, c_z = self._c
+        sign_0, sign_1, sign_2, t_x, t_z, c_x, c_z, o_x, o_z, plane_y = self._chain_of
         s0, c0 = sin(sign_0 * q0), cos(sign_0 * q0)
         angle_1 = sign_1 * q1
         s1, c1 = sin(angle_1), cos(angle_1)
@@ -149,8 +149,8 @@ class LegKinematics:
         s2, c2 = sin(angle_2), cos(angle_2)
         shank_x, shank_z = c2 * c_x + s2 * c_z, c2 * c_z - s2 * c_x
         reach_x, reach_z = c1 * t_x + s1 * t_z + shank_x, c1 * t_z - s1 * t_x + shank_z
-        plane_y, plane_z = self.lateral_offset, self._o[2] + reach_z
-        return (self._o[0] + reach_x, c0 * plane_y - s0 * plane_z, s0 * plane_y + c0 * plane_z,
+        plane_z = o_z + reach_z
+        return (o_x + reach_x, c0 * plane_y - s0 * plane_z, s0 * plane_y + c0 * plane_z,
                 reach_x, reach_z, shank_x, shank_z, s0, c0)
 
 
