@@ -305,9 +305,10 @@ class PostureController:
                  under: Pair, error: Pair) -> tuple[float, ...]:
         """Margins of the capture point for an error of the velocity [m/s]; swings at footholds."""
         places, downhill, slope_lean = [], (*under, 0.0), self.parameters.slope_lean
-        for foot, foothold, swing in zip(feet, self._footholds, stride.activity, strict=True):
-            place = vec3.moved(vec3.times(R_ground_base, foothold), downhill, slope_lean)
-            places.append(vec3.moved(foot, vec3.minus(place, foot), swing))
+        for i, foot in enumerate(feet):
+            foothold = vec3.times(R_ground_base, self._footholds[i])
+            place = vec3.moved(foothold, downhill, slope_lean)
+            places.append(vec3.moved(foot, vec3.minus(place, foot), stride.activity[i]))
         return support_margins(
             places, under, error, self.model.height, self.parameters.friction, self._room)
 

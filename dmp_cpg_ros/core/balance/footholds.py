@@ -158,8 +158,8 @@ class FootPlacement:
         list of four pairs of float
         """
         reached = []
-        for (x, y), straight, depth, lateral in zip(
-            down, self._straight, self._depth, self._lateral, strict=True):
+        for i, (x, y) in enumerate(down):
+            straight, depth, lateral = self._straight[i], self._depth[i], self._lateral[i]
             room, squared = (reach * straight) ** 2 - depth * depth, x * x + y * y
             room, squared = 1e-6 if room < 1e-6 else room, 1e-12 if squared < 1e-12 else squared
             outward = lateral * y
@@ -197,10 +197,12 @@ class FootPlacement:
         if across is not None and across != self._across:
             wished = [(x, y + (at - place)) for (x, y), at, place in zip(
                 wished, across, self._across, strict=True)]
-        return [
-            (x - half_stance * planned_x, _on_own_side(y, place) - half_stance * planned_y)
-            for (x, y), (planned_x, planned_y), (_, place, _) in zip(
-                self.within_reach(wished, p.reach), wanted, self._footholds, strict=True)]
+        shift = []
+        for i, (x, y) in enumerate(self.within_reach(wished, p.reach)):
+            planned_x, planned_y = wanted[i]
+            shift.append((x - half_stance * planned_x,
+                          _on_own_side(y, self._across[i]) - half_stance * planned_y))
+        return shift
 
     def raised(self, p: PostureParameters, shift: Sequence[Pair],
                R_ground_base: Matrix) -> list[float]:

@@ -156,9 +156,9 @@ def contact_weights(cycle_position: Sequence[float], duty: float, activity: Sequ
         In [0, 1].
     """
     lift_off, weights = 0.5 * (1.0 - duty), []
-    for position, swings in zip(cycle_position, activity, strict=True):
+    for i, position in enumerate(cycle_position):
         planned = clamped((abs(position) - lift_off) / transfer, 0.0, 1.0)
-        weights.append(max(planned, 1.0 - swings))
+        weights.append(max(planned, 1.0 - activity[i]))
     return weights
 
 

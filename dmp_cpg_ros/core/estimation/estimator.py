@@ -158,9 +158,9 @@ class BodyEstimator:
             state = replace_unchecked(state, velocity_in_base=np.array(vec3.moved(
                 kept, normal, -vec3.dot(kept, normal))))
         more = dt / self.parameters.contact_settling
-        trust = [min(now, before + more)
-                 for now, before in zip(self._trust(readings, motion, normal),
-                                        memory.estimate.trust.tolist(), strict=True)]
+        before = memory.estimate.trust.tolist()
+        trust = [min(now, before[i] + more)
+                 for i, now in enumerate(self._trust(readings, motion, normal))]
         state, _ = velocity_filter.update(
             state, rate, motion.contact_in_base, motion.velocity_in_base, trust, noise)
         rests = seeing and min(trust) > 0.0 and _is_still(readings, state)
@@ -304,8 +304,8 @@ class BodyEstimator:
         normal = normal_in_world(terrain.slope)
         height, weight = last.height + vec3.dot(normal, velocity) * dt, sum(trust)
         if weight > 0.0:
-            depths = zip(trust, contact, strict=True)
-            measured = -sum(share * vec3.dot(place, normal) for share, place in depths) / weight
+            depths = [share * vec3.dot(contact[i], normal) for i, share in enumerate(trust)]
+            measured = -sum(depths) / weight
             share = 1.0 - exp(-HEIGHT_RATE * min(weight, 1.0) * dt)
             height += share * (measured - height)
         return terrain, BodyEstimate(

@@ -188,20 +188,18 @@ def without_frozen(watch: SensorWatch, readings: SensorReadings, weight: float
 def _heard(watch: SensorWatch, readings: SensorReadings
            ) -> tuple[tuple[int, ...], dict[int, float]]:
     """Stamps at which each joint was heard last, and by how much joints jumped [rad]."""
-    last, now, heard, jumps = watch.readings, readings.joints_ns, [], {}
-    late = watch.doubt.late_ns.tolist()
-    for i, (q, before, rate, rate_before, heard_ns) in enumerate(zip(
-            readings.joint_position.tolist(), last.joint_position.tolist(),
-            readings.joint_velocity.tolist(), last.joint_velocity.tolist(), watch.heard_ns,
-            strict=True)):
-        change = q - before
+    last, now, heard, jumps = watch.readings, readings.joints_ns, [*watch.heard_ns], {}
+    late = watch.doubt.late_ns.tolist() if any(watch.doubt.legs) else None
+    before, rate, rate_before = (of.tolist() for of in (
+        last.joint_position, readings.joint_velocity, last.joint_velocity))
+    for i, q in enumerate(readings.joint_position.tolist()):
+        change = q - before[i]
         if not (change > 0.0 or change < 0.0):  # not a number included
-            heard.append(heard_ns)
             continue
-        heard.append(now)
-        dt = 1e-9 * (now - heard_ns)
-        least, pull = (CAUGHT_UP, CAUGHT_UP_PULL) if late[i // 3] else (APART, PULL)
-        apart, most = change - 0.5 * dt * (rate + rate_before), least + pull * dt * dt
+        dt = 1e-9 * (now - heard[i])
+        heard[i] = now
+        least, pull = (CAUGHT_UP, CAUGHT_UP_PULL) if late and late[i // 3] else (APART, PULL)
+        apart, most = change - 0.5 * dt * (rate[i] + rate_before[i]), least + pull * dt * dt
         if apart > most or apart < -most:
             jumps[i] = apart
     return tuple(heard), jumps

@@ -102,12 +102,13 @@ class LegOdometry:
         n_x, n_y, n_z = normal_in_base
         contacts, velocities, jacobians = [], [], []
         radii = self._rolling_on(force) if self._soft else self._radius
-        for i, ((place, J), sign, radius) in enumerate(
-                zip(self.legs.at(q), self._signs, radii, strict=True)):
-            angles, rates = q[3 * i : 3 * i + 3], triple(q_dot[3 * i : 3 * i + 3])
+        for i, (place, J) in enumerate(self.legs.at(q)):
+            radius, angles = radii[i], q[3 * i : 3 * i + 3]
+            rates = triple(q_dot[3 * i : 3 * i + 3])
             down = (radius * n_x, radius * n_y, radius * n_z)
+            shank = shank_rate(self._signs[i], angles, rates)
             contacts.append(minus(place, down))
-            velocities.append(minus(cross(shank_rate(sign, angles, rates), down), times(J, rates)))
+            velocities.append(minus(cross(shank, down), times(J, rates)))
             jacobians.append(J)
         return FootMotion(tuple(contacts), tuple(velocities), tuple(jacobians))
 
@@ -246,8 +247,8 @@ def terrain_step(terrain: TerrainState, contact_in_world: Sequence[Triple], trus
     -------
     TerrainState
     """
-    feet = zip(contact_in_world, terrain.foothold_in_world, trust, strict=True)
-    footholds = tuple(now if stands >= STANDING else before for now, before, stands in feet)
+    footholds = tuple([contact_in_world[i] if stands >= STANDING else terrain.foothold_in_world[i]
+                       for i, stands in enumerate(trust)])
     share = 1.0 - exp(-dt / time_constant)
     (x, y), (x_now, y_now) = terrain.slope, fitted_slope(footholds)
     return TerrainState(footholds, (x + share * (x_now - x), y + share * (y_now - y)))

@@ -190,11 +190,11 @@ def update(state: FilterState, rate: Array, contact_in_base: Sequence[Triple],
     v, nu = triple(state.velocity_in_base.tolist()), noise.foot_freedom
     total = pull_x = pull_y = pull_z = 0.0
     distances = []
-    for contact, measured, share in zip(contact_in_base, velocity_in_base, trust, strict=True):
+    for i, share in enumerate(trust):
         if share <= 0.0:
             distances.append(0.0)
             continue
-        x, y, z = minus(minus(measured, v), cross(turning, contact))
+        x, y, z = minus(minus(velocity_in_base[i], v), cross(turning, contact_in_base[i]))
         variance = (noise.foot_noise / share) ** 2
         distance = (x * x / (spread_x + variance) + y * y / (spread_y + variance)
                     + z * z / (spread_z + variance))

@@ -91,10 +91,11 @@ def falls(margins: Sequence[float] | None, r: Sequence[float]) -> bool:
     r : sequence of 3 float
         Reference v_x, v_y [m/s], γ [rad/s].
     """
+    if margins is None or min(margins) >= 0.0:
+        return False
     trailing = -TRAILING * hypot(r[0], r[1])
-    return margins is not None and any(
-        margin < 0.0 and x * r[0] + y * r[1] >= trailing
-        for margin, (x, y) in zip(margins, OUTWARD, strict=True))
+    return any(margin < 0.0 and x * r[0] + y * r[1] >= trailing
+               for margin, (x, y) in zip(margins, OUTWARD, strict=True))
 
 
 def least_share(rough: float, gaps: float, falling: bool) -> float:

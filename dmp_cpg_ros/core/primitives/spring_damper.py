@@ -183,10 +183,9 @@ class SpringDamper:
         SpringState
         """
         position, velocity = [], []
-        for y, y_dot, at, rate, (a, b, c, d) in zip(
-                state.position, state.velocity, goal, goal_velocity, self._propagator(dt)[1],
-                strict=True):
-            error, error_rate = y - (at - rate * dt), y_dot - rate
+        for i, (a, b, c, d) in enumerate(self._propagator(dt)[1]):
+            at, rate = goal[i], goal_velocity[i]
+            error, error_rate = state.position[i] - (at - rate * dt), state.velocity[i] - rate
             position.append(at + a * error + b * error_rate)
             velocity.append(rate + c * error + d * error_rate)
         return SpringState(tuple(position), tuple(velocity))

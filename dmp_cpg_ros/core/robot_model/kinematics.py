@@ -196,8 +196,8 @@ class RobotLegs:
         """
         if q != self._at:
             self._at = list(q)
-            self._found = tuple(leg.foot_and_jacobian(q[3 * i:3 * i + 3])
-                                for i, leg in enumerate(self.kinematics))
+            self._found = tuple([leg.foot_and_jacobian(q[3 * i:3 * i + 3])
+                                 for i, leg in enumerate(self.kinematics)])
         return self._found
 
     def foot(self, i: int, q: Sequence[float]) -> Triple:

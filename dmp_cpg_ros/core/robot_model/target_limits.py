@@ -40,21 +40,21 @@ class TargetLimits:
         dt : float
             Time since then [s].
         """
-        before, step = (last.position, self._rate * dt) if last else (targets.position, 0.0)
-        for (low, high, speed, torque), at, was, velocity, effort in zip(
-                self._each, targets.position, before, targets.velocity, targets.effort,
-                strict=True):
-            if not (low <= at <= high and -speed <= velocity <= speed
-                    and -torque <= effort <= torque
-                    and -step * speed <= at - was <= step * speed):
+        position, velocity, effort = targets
+        before, step = (last.position, self._rate * dt) if last else (position, 0.0)
+        for i, (low, high, speed, torque) in enumerate(self._each):
+            at = position[i]
+            if not (low <= at <= high and -speed <= velocity[i] <= speed
+                    and -torque <= effort[i] <= torque
+                    and -step * speed <= at - before[i] <= step * speed):
                 break
         else:
             return targets
-        leg, (position, velocity, effort) = self._leg, np.array(targets)
-        way = step * leg.velocity_limit
+        leg, place = self._leg, np.array(position)
         if last:
-            position = np.clip(position, last.position - way, last.position + way)
+            way = step * leg.velocity_limit
+            place = np.clip(place, last.position - way, last.position + way)
         return LegTargets(
-            np.clip(position, leg.position_lower, leg.position_upper).tolist(),
+            np.clip(place, leg.position_lower, leg.position_upper).tolist(),
             np.clip(velocity, -leg.velocity_limit, leg.velocity_limit).tolist(),
             np.clip(effort, -leg.torque_limit, leg.torque_limit).tolist())

@@ -176,8 +176,8 @@ def activities_step(activities: Sequence[float], phase_rates: Sequence[float],
                     omegas: Sequence[float], rate: float, dt: float) -> tuple[float, ...]:
     """As :func:`activity_step` for a few legs."""
     kept, after = exp(-rate * dt), []
-    for activity, phase_rate, omega in zip(activities, phase_rates, omegas, strict=True):
-        wanted = clamped(phase_rate / omega, 0.0, 1.0)
+    for i, activity in enumerate(activities):
+        wanted = clamped(phase_rates[i] / omegas[i], 0.0, 1.0)
         after.append(wanted + (activity - wanted) * kept)
     return tuple(after)
 

@@ -304,13 +304,10 @@ class LegPrimitive:
         LegTargets
         """
         joints, p = state.joints if measured is None else measured, self.parameters
-        stiffness, damping = p.stiffness, p.damping
-        effort = [
-            J * (stiffness * (g - y) - damping * (y_dot - g_dot)) + tau
-            for J, y, y_dot, g, g_dot, tau in zip(
-                self._inertia, joints.position, joints.velocity, goal, goal_velocity, feedback,
-                strict=True)]
-        return LegTargets(joints.position, joints.velocity, effort)
+        y, y_dot, stiffness, damping = joints.position, joints.velocity, p.stiffness, p.damping
+        effort = [J * (stiffness * (goal[i] - y[i]) - damping * (y_dot[i] - goal_velocity[i]))
+                  + feedback[i] for i, J in enumerate(self._inertia)]
+        return LegTargets(y, y_dot, effort)
 
 
 def body_scale(description: RobotDescription) -> BodyScale:
