@@ -32,6 +32,7 @@ from dmp_cpg_ros.core.maths import Array, clamped, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.records import made_often, replace_unchecked
 from dmp_cpg_ros.core.maths.rotations import levelled
+from dmp_cpg_ros.core.maths.vec3 import Triple, triple
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
@@ -80,7 +81,7 @@ class EstimatorState:
         Footholds and plane.
     estimate : BodyEstimate
         The last one.
-    rate : ndarray (3,)
+    rate : tuple of float
         Last usable reading of the gyroscope [rad/s].
     blind : float
         Time since the IMU could be used [s].
@@ -95,7 +96,7 @@ class EstimatorState:
     filter: FilterState
     terrain: TerrainState
     estimate: BodyEstimate
-    rate: Array
+    rate: Triple
     blind: float
     still: float
     watch: frozen.SensorWatch
@@ -147,16 +148,17 @@ class BodyEstimator:
         seeing = readings.imu_is_usable
         blind = 0.0 if seeing and dt <= BLIND else memory.blind + dt
         noise = replace(self.parameters, **BLIND_NOISE) if blind else self.parameters
-        rate, force = (
-            (readings.rate_in_base, readings.specific_force_in_base) if seeing
-            else self._guessed(memory, readings, told, blind))
-        state = velocity_filter.predict(
-            memory.filter, 0.5 * (memory.rate + rate), force, dt, noise, not seeing)
+        measured = ((readings.rate_in_base, readings.specific_force_in_base) if seeing
+                    else self._guessed(memory, readings, told, blind))
+        rate, force = (triple(of.tolist()) for of in measured)
+        (x, y, z), (last_x, last_y, last_z) = rate, memory.rate
+        mean = 0.5 * (last_x + x), 0.5 * (last_y + y), 0.5 * (last_z + z)
+        state = velocity_filter.predict(memory.filter, mean, force, dt, noise, not seeing)
         motion, normal = self._motion(memory.terrain, state, readings)
         if not (seeing or any(readings.usable_legs)):  # a body that feels nothing stays low
-            kept = vec3.triple(state.velocity_in_base.tolist())
-            state = replace_unchecked(state, velocity_in_base=np.array(vec3.moved(
-                kept, normal, -vec3.dot(kept, normal))))
+            kept = state.velocity_in_base
+            state = replace_unchecked(state, velocity_in_base=vec3.moved(
+                kept, normal, -vec3.dot(kept, normal)))
         more = dt / self.parameters.contact_settling
         before = memory.estimate.trust.tolist()
         trust = [min(now, before[i] + more)
@@ -172,7 +174,7 @@ class BodyEstimator:
             state = velocity_filter.settle(state, rate, STILL_DEVIATION)
         problems = _problems(readings)
         covariance, velocity = state.covariance.ravel(), state.velocity_in_base
-        if not isfinite(covariance.dot(covariance) + velocity.dot(velocity)):
+        if not isfinite(covariance.dot(covariance) + vec3.dot(velocity, velocity)):
             problems, state = (*problems, 'filter'), memory.filter
         terrain, estimate = self._finished(
             memory, state, readings.time_ns, rate, noise.gyro_noise**2 / dt, motion, trust,
@@ -180,13 +182,13 @@ class BodyEstimator:
         if problems:
             estimate = replace_unchecked(estimate, readings=frozen.with_joints(watch, readings))
         imu = memory.imu.followed(
-            memory.filter, state, terrain.slope, told, vec3.triple(rate.tolist()), dt)
+            memory.filter, state, terrain.slope, told, rate, dt)
         if imu.doubted_s and not memory.imu.doubted_s:
             state, slope = memory.imu.unspoilt(state, terrain.slope)
             terrain = replace_unchecked(terrain, slope=slope)
             if any(trust):
                 state = replace_unchecked(state, velocity_in_base=mid_stride.velocity_of_feet(
-                    motion, rate - state.gyro_bias, trust))
+                    motion, vec3.minus(rate, state.gyro_bias), trust))
         return EstimatorState(state, terrain, estimate, rate, blind, still, watch, imu), estimate
 
     def resumed(self, memory: EstimatorState, readings: SensorReadings
@@ -203,16 +205,16 @@ class BodyEstimator:
         """
         seeing, moving = readings.imu_is_usable, mid_stride.moves(readings)
         up = readings.specific_force_in_base if seeing else np.array((0.0, 0.0, 1.0))
-        up, zero = mid_stride.steadied(up) if moving else up, np.zeros(3)
+        up, zero = mid_stride.steadied(up) if moving else up, (0.0, 0.0, 0.0)
         covariance = np.diag(np.repeat(np.square(INITIAL_DEVIATION), 3))
         state = FilterState(levelled(up), zero, zero, zero, covariance)
         if before is not None:
             state = replace_unchecked(before.filter, covariance=covariance)
-        R = vec3.rotation(state.quaternion.tolist())
+        R = vec3.rotation(state.quaternion)
         flat = TerrainState(((0.0, 0.0, 0.0),) * len(LEGS), (0.0, 0.0))
         motion, normal = self._motion(flat, state, readings)
         trust, legs = self._trust(readings, motion, normal), readings.usable_legs
-        rate = readings.rate_in_base if seeing else zero
+        rate = triple(readings.rate_in_base.tolist()) if seeing else zero
         stands = [t > 0.0 for t in trust] if moving and any(trust) else legs
         if moving and any(trust):
             state = replace_unchecked(
@@ -221,14 +223,14 @@ class BodyEstimator:
         depths = [z for (_, _, z), stand in zip(contact, stands, strict=True) if stand]
         height = -sum(depths) / len(depths) if depths else 0.0
         position, way = np.array((0.0, 0.0, height)), 0.0
-        velocity = vec3.times(R, vec3.triple(state.velocity_in_base.tolist()))
+        velocity = vec3.times(R, state.velocity_in_base)
         if before is not None:
             last = before.estimate
             gone = 1e-9 * (readings.time_ns - last.time_ns) * np.array(velocity)
             position, way = last.position_in_world + gone, last.way + float(np.linalg.norm(gone))
         estimate = BodyEstimate(
-            readings.time_ns, position, state.quaternion,
-            state.velocity_in_base, rate, velocity, height,
+            readings.time_ns, position, np.array(state.quaternion),
+            np.array(state.velocity_in_base), np.array(rate), velocity, height,
             np.array(normal_in_world(flat.slope)), np.array(trust), covariance,
             self.parameters.gyro_noise**2 / BLIND, way, _problems(readings))
         feet = tuple((x, y, z + height if stand else 0.0)
@@ -246,21 +248,21 @@ class BodyEstimator:
         """
         state = memory.filter
         trust = np.where(readings.usable_legs, memory.estimate.trust, 0.0)
-        up = np.array(vec3.upward(state.quaternion.tolist()))
-        rate = memory.rate if blind <= BLIND else state.gyro_bias
+        up, bias = np.array(vec3.upward(state.quaternion)), np.array(state.gyro_bias)
+        rate = np.array(memory.rate) if blind <= BLIND else bias
         if told.imu_is_usable:
             rate = told.rate_in_base - np.array(memory.imu.turning)
         if trust.any():
             motion, _ = self._motion(memory.terrain, state, readings)
-            rate = state.gyro_bias + leg_odometry.turn_rate_of_feet(
+            rate = bias + leg_odometry.turn_rate_of_feet(
                 np.array(motion.contact_in_base), np.array(motion.velocity_in_base), trust,
-                rate - state.gyro_bias)
+                rate - bias)
         return rate, GRAVITY * up + state.accelerometer_bias
 
     def _motion(self, terrain: TerrainState, state: FilterState, readings: SensorReadings
-                ) -> tuple[FootMotion, vec3.Triple]:
+                ) -> tuple[FootMotion, Triple]:
         """Motion of the feet, and the normal of the ground in the base."""
-        R = vec3.rotation(state.quaternion.tolist())
+        R = vec3.rotation(state.quaternion)
         normal = vec3.transposed_times(R, normal_in_world(terrain.slope))
         q, q_dot, legs = readings.joint_position, readings.joint_velocity, readings.usable_legs
         if not all(legs):  # a placeholder for legs that are left out later
@@ -268,7 +270,7 @@ class BodyEstimator:
         return self.odometry.motion(
             q.tolist(), q_dot.tolist(), normal, readings.foot_force.tolist()), normal
 
-    def _trust(self, readings: SensorReadings, motion: FootMotion, normal: vec3.Triple
+    def _trust(self, readings: SensorReadings, motion: FootMotion, normal: Triple
                ) -> list[float]:
         """Trust in each foot from its force alone, in [0, 1]; 0 for legs without joints."""
         force = readings.foot_force.tolist()
@@ -285,18 +287,18 @@ class BodyEstimator:
             for felt, usable in zip(force, readings.usable_legs, strict=True)]
 
     def _finished(
-        self, memory: EstimatorState, state: FilterState, time_ns: int, rate: Array,
+        self, memory: EstimatorState, state: FilterState, time_ns: int, rate: Triple,
         rate_noise: float, motion: FootMotion, trust: list[float], blind: bool,
         problems: tuple[str, ...],
     ) -> tuple[TerrainState, BodyEstimate]:
         """Integrate the position, follow the ground, and put the estimate together."""
         last = memory.estimate
         dt = time_step(last.time_ns, time_ns)
-        R = vec3.rotation(state.quaternion.tolist())
-        v = vec3.times(R, vec3.triple(state.velocity_in_base.tolist()))
+        R = vec3.rotation(state.quaternion)
+        v = vec3.times(R, state.velocity_in_base)
         u = last.velocity_in_world
         velocity = 0.5 * (v[0] + u[0]), 0.5 * (v[1] + u[1]), 0.5 * (v[2] + u[2])
-        position = vec3.moved(vec3.triple(last.position_in_world.tolist()), velocity, dt)
+        position = vec3.moved(triple(last.position_in_world.tolist()), velocity, dt)
         contact = [vec3.times(R, place) for place in motion.contact_in_base]
         terrain = leg_odometry.terrain_step(
             memory.terrain, [vec3.plus(position, place) for place in contact], trust, dt,
@@ -309,8 +311,9 @@ class BodyEstimator:
             share = 1.0 - exp(-HEIGHT_RATE * min(weight, 1.0) * dt)
             height += share * (measured - height)
         return terrain, BodyEstimate(
-            time_ns, np.array(position), state.quaternion, state.velocity_in_base,
-            rate - state.gyro_bias, v, height, np.array(normal), np.array(trust),
+            time_ns, np.array(position), np.array(state.quaternion),
+            np.array(state.velocity_in_base), np.array(vec3.minus(rate, state.gyro_bias)), v,
+            height, np.array(normal), np.array(trust),
             state.covariance, rate_noise, last.way + hypot(*velocity) * dt, problems)
 
 

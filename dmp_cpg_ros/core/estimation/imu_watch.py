@@ -108,12 +108,12 @@ class ImuWatch(NamedTuple):
         """
         if not (readings.imu_is_usable and all(readings.usable_legs)):
             return ImuWatch(turning=self.turning, doubted_s=self.doubted_s)
-        up, velocity = upward(after.quaternion.tolist()), triple(after.velocity_in_base.tolist())
+        up, velocity = upward(after.quaternion), after.velocity_in_base
         guessed = max(before.covariance.diagonal()[VELOCITY].tolist()) > GUESSED * GUESSED
         if up[2] < UPRIGHT or guessed and not self.doubted_s:
             return NEW
-        turning = minus(rate, triple(after.gyro_bias.tolist()))
-        change = minus(velocity, triple(before.velocity_in_base.tolist()))
+        turning = minus(rate, after.gyro_bias)
+        change = minus(velocity, before.velocity_in_base)
         felt = moved(triple(readings.specific_force_in_base.tolist()), up, -GRAVITY)
         felt = minus(moved(felt, change, -1.0 / dt), cross(turning, velocity))
         share = 1.0 - exp(-dt / MEMORY_S)
@@ -140,7 +140,7 @@ class ImuWatch(NamedTuple):
         if self.kept is None:
             return state, slope
         kept, slope = self.kept
-        up, now = upward(kept.quaternion.tolist()), upward(state.quaternion.tolist())
+        up, now = upward(kept.quaternion), upward(state.quaternion)
         return replace_unchecked(
             state, quaternion=turned(state.quaternion, cross(up, now)),
             gyro_bias=kept.gyro_bias, accelerometer_bias=kept.accelerometer_bias), slope

@@ -29,7 +29,7 @@ import numpy as np
 from dmp_cpg_ros.core.gait.contact_feedback import quarter_weight
 from dmp_cpg_ros.core.maths import Array, clamped
 from dmp_cpg_ros.core.maths.records import made_often
-from dmp_cpg_ros.core.maths.rotations import turned
+from dmp_cpg_ros.core.maths.rotations import Quaternion, turned
 from dmp_cpg_ros.core.maths.vec3 import (
     Matrix,
     Triple,
@@ -275,14 +275,14 @@ def fitted_slope(points: Sequence[Sequence[float]]) -> tuple[float, float]:
     return a * scale, b * scale
 
 
-def levelled_by_feet(quaternion: Array, terrain: TerrainState, share: float) -> Array:
+def levelled_by_feet(quaternion: Quaternion, terrain: TerrainState, share: float) -> Quaternion:
     """Orientation turned by a share of the angle by which the newest footholds seem to leave the
     plane: with a vertical that is only integrated, on ground that goes on as it was, it is the
     body's own that has drifted.
 
     Parameters
     ----------
-    quaternion : ndarray (4,)
+    quaternion : tuple of four floats
         x, y, z, w.
     terrain : TerrainState
         Footholds, and the slope that is believed.
@@ -291,10 +291,10 @@ def levelled_by_feet(quaternion: Array, terrain: TerrainState, share: float) -> 
 
     Returns
     -------
-    ndarray (4,)
+    tuple of four floats
     """
     (x, y), (x_now, y_now) = terrain.slope, fitted_slope(terrain.foothold_in_world)
-    turn = transposed_times(rotation(quaternion.tolist()),
+    turn = transposed_times(rotation(quaternion),
                             (share * (y - y_now), share * (x_now - x), 0.0))
     return turned(quaternion, turn)
 

@@ -16,6 +16,7 @@ import numpy as np
 from dmp_cpg_ros.core.estimation.leg_odometry import FootMotion
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.maths.vec3 import Triple, triple
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 
 MOVING_JOINT = 0.15
@@ -57,17 +58,18 @@ def steadied(force: Array) -> Array:
     return np.array((SHAKEN_SHARE * force[0], SHAKEN_SHARE * force[1], along))
 
 
-def velocity_of_feet(motion: FootMotion, rate: Array, trust: Sequence[float]) -> Array:
-    """Velocity of the body by the feet that stand, their mean by trust, ndarray (3,) [m/s].
+def velocity_of_feet(motion: FootMotion, rate: Triple, trust: Sequence[float]) -> Triple:
+    """Velocity of the body by the feet that stand, their mean by trust [m/s].
 
     Parameters
     ----------
     motion : FootMotion
         Of the feet.
-    rate : ndarray (3,)
+    rate : tuple of float
         Turn rate of the body [rad/s].
     trust : sequence of float
         In each foot; one at least is not 0.
     """
     contact, velocity = np.array(motion.contact_in_base), np.array(motion.velocity_in_base)
-    return np.average(velocity - np.cross(rate, contact), axis=0, weights=trust)
+    return triple(np.average(
+        velocity - np.cross(rate, contact), axis=0, weights=trust).tolist())

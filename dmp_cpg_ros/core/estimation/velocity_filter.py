@@ -34,8 +34,8 @@ from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.records import made_often, replace_unchecked
-from dmp_cpg_ros.core.maths.rotations import turned
-from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, cross, minus, moved, triple
+from dmp_cpg_ros.core.maths.rotations import Quaternion, turned
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, cross, minus, moved, plus, triple
 
 TILT, VELOCITY, GYRO_BIAS, ACCELEROMETER_BIAS = (slice(3 * i, 3 * i + 3) for i in range(4))
 """Places in the error state."""
@@ -63,20 +63,20 @@ class FilterState:
 
     Attributes
     ----------
-    quaternion : ndarray (4,)
+    quaternion : tuple of four floats
         Orientation of the base in the world, x, y, z, w.
-    velocity_in_base : ndarray (3,)
+    velocity_in_base : tuple of float
         [m/s]
-    gyro_bias, accelerometer_bias : ndarray (3,)
+    gyro_bias, accelerometer_bias : tuple of float
         [rad/s], [m/s²]
     covariance : ndarray (12, 12)
         Of the error state.
     """
 
-    quaternion: Array
-    velocity_in_base: Array
-    gyro_bias: Array
-    accelerometer_bias: Array
+    quaternion: Quaternion
+    velocity_in_base: Triple
+    gyro_bias: Triple
+    accelerometer_bias: Triple
     covariance: Array
 
 
@@ -111,7 +111,7 @@ def _skew(v: Triple, scale: float) -> tuple[float, ...]:
     return -z, y, z, -x, -y, x
 
 
-def predict(state: FilterState, rate: Array, specific_force: Array, dt: float,
+def predict(state: FilterState, rate: Triple, specific_force: Triple, dt: float,
             noise: EstimationParameters, guessed: bool = False) -> FilterState:
     """Predict by the IMU's readings.
 
@@ -119,7 +119,7 @@ def predict(state: FilterState, rate: Array, specific_force: Array, dt: float,
     ----------
     state : FilterState
         State before.
-    rate, specific_force : ndarray (3,)
+    rate, specific_force : tuple of float
         ω̃ [rad/s] and f̃ [m/s²], means over the interval.
     dt : float
         Length of the interval [s].
@@ -133,10 +133,9 @@ def predict(state: FilterState, rate: Array, specific_force: Array, dt: float,
     -------
     FilterState
     """
-    up = vec3.upward(state.quaternion.tolist())
-    v = triple(state.velocity_in_base.tolist())
-    rate, specific_force = rate - state.gyro_bias, specific_force - state.accelerometer_bias
-    turning, force = triple(rate.tolist()), triple(specific_force.tolist())
+    up, v = vec3.upward(state.quaternion), state.velocity_in_base
+    turning = minus(rate, state.gyro_bias)
+    force = minus(specific_force, state.accelerometer_bias)
     turn = (turning[0] * dt, turning[1] * dt, turning[2] * dt)
     # in the base half-way, as the mean force is
     tilted, fallen = cross(turn, up), GRAVITY * dt
@@ -145,7 +144,7 @@ def predict(state: FilterState, rate: Array, specific_force: Array, dt: float,
               force[2] * dt - fallen * (up[2] - 0.5 * tilted[2]))
     # The new velocity is seen from the new orientation.
     back, twice = cross(turn, moved(v, change, 0.5)), cross(turn, cross(turn, v))
-    velocity = np.array(moved(minus(vec3.plus(v, change), back), twice, 0.5))
+    velocity = moved(minus(plus(v, change), back), twice, 0.5)
     F = _IDENTITY if guessed else transition(v, up, turning, dt)
     P = F.dot(state.covariance).dot(F.T)
     P.ravel()[::13] += noise.spread * dt
@@ -153,7 +152,7 @@ def predict(state: FilterState, rate: Array, specific_force: Array, dt: float,
                        state.accelerometer_bias, P)
 
 
-def update(state: FilterState, rate: Array, contact_in_base: Sequence[Triple],
+def update(state: FilterState, rate: Triple, contact_in_base: Sequence[Triple],
            velocity_in_base: Sequence[Triple], trust: Sequence[float], noise: EstimationParameters
            ) -> tuple[FilterState, tuple[float, ...]]:
     """Correct by the velocities that standing feet measure.
@@ -167,7 +166,7 @@ def update(state: FilterState, rate: Array, contact_in_base: Sequence[Triple],
     ----------
     state : FilterState
         Predicted state.
-    rate : ndarray (3,)
+    rate : tuple of float
         ω̃ at the time of the state [rad/s].
     contact_in_base, velocity_in_base : sequence of n tuples of float
         Contact points r [m] and measured v + ω × r [m/s] of the feet.
@@ -186,8 +185,7 @@ def update(state: FilterState, rate: Array, contact_in_base: Sequence[Triple],
     P = state.covariance
     predicted = P[VELOCITY, VELOCITY].tolist()
     spread_x, spread_y, spread_z = predicted[0][0], predicted[1][1], predicted[2][2]
-    turning = triple((rate - state.gyro_bias).tolist())
-    v, nu = triple(state.velocity_in_base.tolist()), noise.foot_freedom
+    turning, v, nu = minus(rate, state.gyro_bias), state.velocity_in_base, noise.foot_freedom
     total = pull_x = pull_y = pull_z = 0.0
     distances = []
     for i, share in enumerate(trust):
@@ -206,15 +204,16 @@ def update(state: FilterState, rate: Array, contact_in_base: Sequence[Triple],
         return state, tuple(distances)
     HP = P[VELOCITY]
     KT = np.array(vec3.inverse(_with_diagonal(predicted, 1.0 / total))).dot(HP)  # (3, 12)
-    error = np.array((pull_x / total, pull_y / total, pull_z / total)).dot(KT)
+    error = np.array((pull_x / total, pull_y / total, pull_z / total)).dot(KT).tolist()
     P = P - HP.T.dot(KT)
     return FilterState(
-        turned(state.quaternion, error[TILT].tolist()), state.velocity_in_base + error[VELOCITY],
-        state.gyro_bias + error[GYRO_BIAS], state.accelerometer_bias + error[ACCELEROMETER_BIAS],
-        0.5 * (P + P.T)), tuple(distances)
+        turned(state.quaternion, error[TILT]), plus(state.velocity_in_base, error[VELOCITY]),
+        plus(state.gyro_bias, error[GYRO_BIAS]),
+        plus(state.accelerometer_bias, error[ACCELEROMETER_BIAS]), 0.5 * (P + P.T)
+    ), tuple(distances)
 
 
-def settle(state: FilterState, rate: Array, deviation: float) -> FilterState:
+def settle(state: FilterState, rate: Triple, deviation: float) -> FilterState:
     """Correct the gyroscope's bias by the knowledge that the body does not turn.
 
     Nothing else is corrected (Schmidt's consider filter): what yaw should have been all the while
@@ -224,7 +223,7 @@ def settle(state: FilterState, rate: Array, deviation: float) -> FilterState:
     ----------
     state : FilterState
         State of a robot that stands still.
-    rate : ndarray (3,)
+    rate : tuple of float
         ω̃, which is the bias then [rad/s].
     deviation : float
         Of the turn rate of a robot that stands still [rad/s].
@@ -240,8 +239,8 @@ def settle(state: FilterState, rate: Array, deviation: float) -> FilterState:
     after = left.dot(rows)
     P[GYRO_BIAS] = after
     P[:, GYRO_BIAS] = after.T
-    bias = rate - left.dot(rate - state.gyro_bias)
-    return replace_unchecked(state, gyro_bias=bias, covariance=0.5 * (P + P.T))
+    off = triple(left.dot(np.subtract(rate, state.gyro_bias)).tolist())
+    return replace_unchecked(state, gyro_bias=minus(rate, off), covariance=0.5 * (P + P.T))
 
 
 def _with_diagonal(M: list[list[float]], more: float) -> Matrix:

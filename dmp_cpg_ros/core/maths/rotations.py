@@ -7,27 +7,28 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import asin, atan2, cos, sin, sqrt
 
-import numpy as np
-
 from dmp_cpg_ros.core.maths import Array
 
+Quaternion = tuple[float, float, float, float]
+"""Orientation x, y, z, w, of length 1."""
 
-def turned(quaternion: Array, rotation_vector: Iterable[float]) -> Array:
+
+def turned(quaternion: Iterable[float], rotation_vector: Iterable[float]) -> Quaternion:
     """Turn a quaternion by a rotation vector in its own (the body's) frame: q ⊗ exp(φ/2).
 
     Parameters
     ----------
-    quaternion : ndarray (4,)
+    quaternion : iterable of four floats
         Of length 1.
     rotation_vector : iterable of three floats
         φ, axis times angle [rad].
 
     Returns
     -------
-    ndarray (4,)
+    tuple of four floats
         Of length 1.
     """
-    x, y, z, w = quaternion.tolist()
+    x, y, z, w = quaternion
     a, b, c = rotation_vector
     angle = sqrt(a * a + b * b + c * c)
     scale = sin(0.5 * angle) / angle if angle > 1e-9 else 0.5
@@ -37,7 +38,7 @@ def turned(quaternion: Array, rotation_vector: Iterable[float]) -> Array:
     qz = w * c + x * b - y * a + z * d
     qw = w * d - x * a - y * b - z * c
     length = sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
-    return np.array((qx / length, qy / length, qz / length, qw / length))
+    return qx / length, qy / length, qz / length, qw / length
 
 
 def roll_pitch_yaw(quaternion: Array) -> tuple[float, float, float]:
@@ -49,7 +50,7 @@ def roll_pitch_yaw(quaternion: Array) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
-def levelled(upward_in_base: Array) -> Array:
+def levelled(upward_in_base: Array) -> Quaternion:
     """Quaternion of zero heading whose vertical is seen in the base as a given direction.
 
     Parameters
@@ -59,9 +60,9 @@ def levelled(upward_in_base: Array) -> Array:
 
     Returns
     -------
-    ndarray (4,)
+    tuple of four floats
     """
     x, y, z = upward_in_base.tolist()
     roll, pitch = atan2(y, z), atan2(-x, sqrt(y * y + z * z))
     sr, cr, sp, cp = sin(0.5 * roll), cos(0.5 * roll), sin(0.5 * pitch), cos(0.5 * pitch)
-    return np.array((sr * cp, cr * sp, -sr * sp, cr * cp))
+    return sr * cp, cr * sp, -sr * sp, cr * cp

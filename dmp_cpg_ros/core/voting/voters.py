@@ -215,8 +215,8 @@ class UpFilter:
             up = force / strength if plausible else self.up_in_base
             return replace(self, up_in_base=up, time_ns=sensors.imu_ns)
         # What stands still in the world turns back in the body.
-        turn = turned(np.array((0.0, 0.0, 0.0, 1.0)), (sensors.rate_in_base * dt).tolist())
-        up = self.up_in_base @ np.array(rotation(turn.tolist()))
+        turn = turned((0.0, 0.0, 0.0, 1.0), (sensors.rate_in_base * dt).tolist())
+        up = self.up_in_base @ np.array(rotation(turn))
         if plausible:
             up = up + (force / strength - up) * (1.0 - exp(-dt / TIME_CONSTANT))
         length = sqrt(float(up @ up))

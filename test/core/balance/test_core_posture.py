@@ -148,8 +148,8 @@ def test_who_feels_nothing_carries_its_weight_as_planned(gait: str) -> None:
     felt = replace(
         state, joint_position=state.joint_position + 0.3, felt_legs=(False,) * 4,
         base_velocity_in_base=np.array((1.0, 0.3, 0.0)), gyro_in_base=np.full(3, np.nan),
-        base_rate_in_base=np.ones(3), base_quaternion=turned(
-            state.base_quaternion, np.array((0.2, -0.1, 0.0))))
+        base_rate_in_base=np.ones(3), base_quaternion=np.array(
+            turned(state.base_quaternion, (0.2, -0.1, 0.0))))
     told = [of.step(of.initial_state(), of_state, GAITS[gait], x, 0.0 * x, np.zeros(3), TICK)[1]
             for of_state in (state, felt)]
     assert np.allclose(told[1].torque, told[0].torque, atol=1e-6)
@@ -198,7 +198,7 @@ def test_on_a_slope_parallel_to_it_the_feet_carry_the_weight(slope: tuple[float,
     normal = np.array(normal_in_world(slope))
     axis = np.cross((0.0, 0.0, 1.0), normal)
     turn = axis / np.linalg.norm(axis) * np.arccos(normal[2])
-    state = standing_state(ROBOT, base_quaternion=turned(np.array([0.0, 0.0, 0.0, 1.0]), turn),
+    state = standing_state(ROBOT, base_quaternion=np.array(turned((0.0, 0.0, 0.0, 1.0), turn)),
                            ground_normal_in_world=normal)
     feedback = of.step(of.initial_state(), state, AMBLE, x, 0.0 * x, np.zeros(3), TICK)[1]
     R_world_base = np.array(rotation(state.base_quaternion.tolist()))
@@ -224,7 +224,7 @@ def test_feet_that_walk_on_a_slope_hold_the_body_as_on_level_ground(slope: tuple
     normal = np.array(normal_in_world(slope))
     axis = np.cross((0.0, 0.0, 1.0), normal)
     turn = axis / np.linalg.norm(axis) * np.arccos(normal[2])
-    leaning = replace(level, base_quaternion=turned(level.base_quaternion, turn),
+    leaning = replace(level, base_quaternion=np.array(turned(level.base_quaternion, turn)),
                       ground_normal_in_world=normal)
     walking = of.initial_state()._replace(activity=(1.0,) * 4)
     (flat, steep), (_, stood) = ([
@@ -353,7 +353,7 @@ def test_the_mass_is_found_on_the_side_that_sinks(
     """Roll left up means that mass is to the right; pitch nose down that it is ahead."""
     p, length = PostureParameters(), 0.28
     roll, pitch = tilt
-    R = rotation(turned(np.array((0.0, 0.0, 0.0, 1.0)), np.array((roll, pitch, 0.0))).tolist())
+    R = rotation(turned((0.0, 0.0, 0.0, 1.0), (roll, pitch, 0.0)))
     found = MassOffset()
     for _ in range(1000):
         found = found.found(p, length, 1.0, R, TICK)
@@ -368,7 +368,7 @@ def test_the_mass_is_found_on_the_side_that_sinks(
 
 
 def test_of_a_slight_tilt_nothing_is_concluded() -> None:
-    R = rotation(turned(np.array((0.0, 0.0, 0.0, 1.0)), np.array((0.02, -0.02, 0.0))).tolist())
+    R = rotation(turned((0.0, 0.0, 0.0, 1.0), (0.02, -0.02, 0.0)))
     found = MassOffset()
     for _ in range(5000):
         found = found.found(PostureParameters(), 0.28, 1.0, R, TICK)

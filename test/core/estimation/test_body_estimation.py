@@ -16,7 +16,7 @@ from dmp_cpg_ros.core.estimation.body_estimate import BodyEstimate
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw, turned
-from dmp_cpg_ros.core.maths.vec3 import rotation
+from dmp_cpg_ros.core.maths.vec3 import plus, rotation
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -74,8 +74,8 @@ def test_wrong_velocity_and_tilt_converge(exact: list[SensorReadings]) -> None:
     def kick(memory: EstimatorState) -> EstimatorState:
         state = memory.filter
         wrong = dataclasses.replace(
-            state, velocity_in_base=state.velocity_in_base + (0.3, -0.2, 0.1),
-            quaternion=turned(state.quaternion, np.array([0.03, -0.02, 0.0])),
+            state, velocity_in_base=plus(state.velocity_in_base, (0.3, -0.2, 0.1)),
+            quaternion=turned(state.quaternion, (0.03, -0.02, 0.0)),
             covariance=np.diag(np.repeat((0.05, 0.3, 0.001, 0.01), 3) ** 2))
         return dataclasses.replace(memory, filter=wrong)
 

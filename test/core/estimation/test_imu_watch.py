@@ -97,11 +97,10 @@ def test_a_velocity_that_was_a_guess_puts_no_imu_in_doubt() -> None:
 
 def test_the_plane_of_the_feet_brings_a_vertical_back() -> None:
     feet = tuple((x, y, 0.1 * x - 0.05 * y) for x in (0.2, -0.2) for y in (0.1, -0.1))
-    drifted = np.array((0.03, -0.02, 0.01))
-    quaternion = turned(np.array((0.0, 0.0, 0.0, 1.0)), drifted)
-    spoilt = turned(quaternion, np.array((0.0, 0.0, 0.4)))
+    quaternion = turned((0.0, 0.0, 0.0, 1.0), (0.03, -0.02, 0.01))
+    spoilt = turned(quaternion, (0.0, 0.0, 0.4))
     R = np.eye(3) + np.array(((0.0, 0.0, -0.02), (0.0, 0.0, -0.03), (0.02, 0.03, 0.0)))
     seen = tuple(tuple((R @ np.array(foot)).tolist()) for foot in feet)
     back = levelled_by_feet(spoilt, TerrainState(seen, (0.1, -0.05)), 1.0)
-    up = np.array(upward(back.tolist()))
-    assert np.hypot(*up[:2]) < 0.2 * np.hypot(*upward(spoilt.tolist())[:2])
+    up = np.array(upward(back))
+    assert np.hypot(*up[:2]) < 0.2 * np.hypot(*upward(spoilt)[:2])

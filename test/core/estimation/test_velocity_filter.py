@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -28,15 +29,15 @@ from dmp_cpg_ros.core.estimation.velocity_filter import (
 )
 from dmp_cpg_ros.core.gait.contact_feedback import quarter_weight
 from dmp_cpg_ros.core.maths.rotations import levelled, roll_pitch_yaw, turned
-from dmp_cpg_ros.core.maths.vec3 import Triple, rotation, triple
+from dmp_cpg_ros.core.maths.vec3 import Triple, minus, plus, rotation, triple
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 
 NOISE = EstimationParameters()
 RANDOM = np.random.default_rng(7)
 
 
-def rotation_matrix(quaternion: np.ndarray) -> np.ndarray:
-    return np.array(rotation(quaternion.tolist()))
+def rotation_matrix(quaternion: Sequence[float]) -> np.ndarray:
+    return np.array(rotation(quaternion))
 
 
 def skew(v: np.ndarray) -> np.ndarray:
@@ -45,16 +46,18 @@ def skew(v: np.ndarray) -> np.ndarray:
 
 
 def some_state() -> FilterState:
-    quaternion = turned(np.array([0.0, 0.0, 0.0, 1.0]), RANDOM.normal(0.0, 0.5, 3))
+    quaternion = turned((0.0, 0.0, 0.0, 1.0), RANDOM.normal(0.0, 0.5, 3).tolist())
     root = RANDOM.normal(0.0, 0.1, (12, 12))
-    return FilterState(quaternion, RANDOM.normal(0.0, 1.0, 3), RANDOM.normal(0.0, 0.01, 3),
-                       RANDOM.normal(0.0, 0.1, 3), root @ root.T)
+    velocity, gyro_bias, bias = (
+        triple(RANDOM.normal(0.0, size, 3).tolist()) for size in (1.0, 0.01, 0.1))
+    return FilterState(quaternion, velocity, gyro_bias, bias, root @ root.T)
 
 
 def moved(state: FilterState, error: np.ndarray) -> FilterState:
     """State plus an error state."""
-    return FilterState(turned(state.quaternion, error[:3]), state.velocity_in_base + error[3:6],
-                       state.gyro_bias + error[6:9], state.accelerometer_bias + error[9:],
+    turn, velocity, gyro_bias, bias = (triple(part) for part in error.reshape(4, 3).tolist())
+    return FilterState(turned(state.quaternion, turn), plus(state.velocity_in_base, velocity),
+                       plus(state.gyro_bias, gyro_bias), plus(state.accelerometer_bias, bias),
                        state.covariance)
 
 
@@ -62,22 +65,21 @@ def error_between(state: FilterState, other: FilterState) -> np.ndarray:
     """Error state, to first order, that takes a state to another."""
     E = rotation_matrix(state.quaternion).T @ rotation_matrix(other.quaternion)
     turn = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
-    return np.concatenate((turn, other.velocity_in_base - state.velocity_in_base,
-                           other.gyro_bias - state.gyro_bias,
-                           other.accelerometer_bias - state.accelerometer_bias))
+    return np.concatenate((turn, minus(other.velocity_in_base, state.velocity_in_base),
+                           minus(other.gyro_bias, state.gyro_bias),
+                           minus(other.accelerometer_bias, state.accelerometer_bias)))
 
 
 @pytest.mark.parametrize('_', range(5))
 def test_the_jacobian_of_the_prediction(_: int) -> None:
     state, dt = some_state(), 1e-3
-    rate, force = RANDOM.normal(0.0, 2.0, 3), RANDOM.normal(0.0, 10.0, 3)
+    rate, force = (triple(RANDOM.normal(0.0, size, 3).tolist()) for size in (2.0, 10.0))
     after = predict(state, rate, force, dt, NOISE)
     by_differences = differences(
         lambda e: error_between(after, predict(moved(state, e), rate, force, dt, NOISE)),
         np.zeros(12), 1e-5)
     up = triple(rotation_matrix(state.quaternion)[2].tolist())
-    F = transition(triple(state.velocity_in_base.tolist()), up,
-                   triple((rate - state.gyro_bias).tolist()), dt)
+    F = transition(state.velocity_in_base, up, minus(rate, state.gyro_bias), dt)
     # F is of first order in dt; rates here are up to 20 per second.
     np.testing.assert_allclose(F, by_differences, atol=(20.0 * dt) ** 2)
     assert np.abs(by_differences - np.eye(12)).max() > 5.0 * dt
@@ -148,9 +150,9 @@ def test_an_update_reduces_the_covariance_and_keeps_it_one() -> None:
 
 def test_standing_still_makes_the_reading_the_bias() -> None:
     state = dataclasses.replace(some_state(), covariance=np.diag(np.full(12, 0.01)))
-    rate = state.gyro_bias + (0.003, -0.002, 0.001)
+    rate = plus(state.gyro_bias, (0.003, -0.002, 0.001))
     after = settle(state, rate, 0.1)  # as uncertain as the bias was: half the way
-    np.testing.assert_allclose(after.gyro_bias, 0.5 * (state.gyro_bias + rate))
+    np.testing.assert_allclose(after.gyro_bias, 0.5 * np.add(state.gyro_bias, rate))
     assert np.array_equal(after.velocity_in_base, state.velocity_in_base)
     assert after.covariance.diagonal()[6:9] == pytest.approx(np.full(3, 0.005))
     state = some_state()
@@ -161,7 +163,7 @@ def test_standing_still_makes_the_reading_the_bias() -> None:
     bias = np.arange(6, 9)
     P = state.covariance[np.ix_(bias, bias)]
     K = P @ np.linalg.inv(P + 0.01 * np.eye(3))
-    np.testing.assert_allclose(after.gyro_bias, state.gyro_bias + K @ (rate - state.gyro_bias))
+    np.testing.assert_allclose(after.gyro_bias, state.gyro_bias + K @ minus(rate, state.gyro_bias))
     np.testing.assert_allclose(after.covariance[np.ix_(bias, bias)], (np.eye(3) - K) @ P,
                                atol=1e-12)
 
@@ -173,21 +175,21 @@ def test_a_foot_that_disagrees_weighs_less() -> None:
     for size in (0.01, 1.0, 100.0):
         measured = state.velocity_in_base + np.array([[size, 0.0, 0.0], [0.0, 0.0, 0.0]])
         after, distance = update(state, zero, contact, measured, np.ones(2), NOISE)
-        gains.append((after.velocity_in_base - state.velocity_in_base)[0] / size)
+        gains.append(minus(after.velocity_in_base, state.velocity_in_base)[0] / size)
         assert distance[0] > distance[1]
     assert gains[0] > 1.5 * gains[1] > 10.0 * gains[2] > 0.0
 
 
 def test_a_body_that_accelerates_unseen_does_not_tilt() -> None:
     """What a guess misses is no error of the vertical, as what an IMU does not tell may be."""
-    zero, level = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
+    zero, level = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
     tilts = []
     for guessed in (False, True):
         state = FilterState(level, zero, zero, zero, 1e-3 * np.eye(12))
         for _ in range(100):
-            state = predict(state, zero, np.array([0.0, 0.0, GRAVITY]), 4e-3, NOISE, guessed)
+            state = predict(state, zero, (0.0, 0.0, GRAVITY), 4e-3, NOISE, guessed)
         after, _ = update(state, zero, [(0.2, 0.1, -0.3)], [(0.3, 0.0, 0.0)], [1.0], NOISE)
-        tilts.append(np.abs(roll_pitch_yaw(after.quaternion)).max())
+        tilts.append(np.abs(roll_pitch_yaw(np.array(after.quaternion))).max())
     assert tilts[0] > 0.01 and not tilts[1]
 
 
@@ -219,7 +221,7 @@ def test_a_foot_that_has_just_come_down_turns_no_body() -> None:
 def test_rotations_agree_with_each_other() -> None:
     for _ in range(10):
         v, u = RANDOM.normal(0.0, 1.0, 3), RANDOM.normal(0.0, 1.0, 3)
-        q = turned(np.array([0.0, 0.0, 0.0, 1.0]), v)
+        q = turned((0.0, 0.0, 0.0, 1.0), v)
         R = rotation_matrix(q)
         np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
         angle = np.linalg.norm(v)
@@ -227,7 +229,7 @@ def test_rotations_agree_with_each_other() -> None:
             R, np.eye(3) + np.sin(angle) / angle * skew(v)
             + (1.0 - np.cos(angle)) / angle**2 * skew(v) @ skew(v), atol=1e-12)  # Rodrigues
         np.testing.assert_allclose(rotation_matrix(turned(q, u)), R @ rotation_matrix(
-            turned(np.array([0.0, 0.0, 0.0, 1.0]), u)), atol=1e-12)
+            turned((0.0, 0.0, 0.0, 1.0), u)), atol=1e-12)
     for small in (0.0, 1e-12, 1e-7):
         np.testing.assert_allclose(
             turned(q, np.full(3, small)), q, atol=2.0 * small + 1e-15)
@@ -235,10 +237,10 @@ def test_rotations_agree_with_each_other() -> None:
 
 def test_a_body_at_rest_is_levelled_by_its_accelerometer() -> None:
     for _ in range(10):
-        R = rotation_matrix(turned(np.array([0.0, 0.0, 0.0, 1.0]), RANDOM.normal(0.0, 0.6, 3)))
+        R = rotation_matrix(turned((0.0, 0.0, 0.0, 1.0), RANDOM.normal(0.0, 0.6, 3)))
         q = levelled(GRAVITY * R[2])
         np.testing.assert_allclose(rotation_matrix(q)[2], R[2], atol=1e-12)
-        assert roll_pitch_yaw(q)[2] == pytest.approx(0.0, abs=1e-12)
+        assert roll_pitch_yaw(np.array(q))[2] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_torques_tell_the_force_on_a_foot() -> None:

@@ -32,14 +32,14 @@ def test_products_and_inverse(_: int) -> None:
 
 def test_rotations() -> None:
     vector = RANDOM.normal(size=3)
-    quaternion = turned(np.array([0.0, 0.0, 0.0, 1.0]), vector)
-    R, angle = np.array(vec3.rotation(quaternion.tolist())), float(np.linalg.norm(vector))
+    quaternion = turned((0.0, 0.0, 0.0, 1.0), vector.tolist())
+    R, angle = np.array(vec3.rotation(quaternion)), float(np.linalg.norm(vector))
     (x, y, z), across = vector / angle, np.cross(vector, [1.0, 2.0, 3.0])
     K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     np.testing.assert_allclose(
         R, np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K, atol=1e-12)
     assert vector @ np.cross(across, R @ across) * np.sin(angle) > 0.0
-    np.testing.assert_array_equal(vec3.upward(quaternion.tolist()), R[2])
+    np.testing.assert_array_equal(vec3.upward(quaternion), R[2])
 
 
 def test_a_singular_matrix_has_no_inverse() -> None:

@@ -19,7 +19,7 @@ from dmp_cpg_ros.core.robot_model.ground_frame import (
     turned_back,
 )
 
-LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
+LEVEL = (0.0, 0.0, 0.0, 1.0)
 
 
 def ground_on(slope: tuple[float, float] | None, turn: tuple[float, float, float],
@@ -29,7 +29,7 @@ def ground_on(slope: tuple[float, float] | None, turn: tuple[float, float, float
 
 
 def attitude(turn: tuple[float, float, float]) -> Matrix:
-    return rotation(turned(LEVEL, np.array(turn)).tolist())
+    return rotation(turned(LEVEL, turn))
 
 
 @pytest.mark.parametrize('turn', [(0.0, 0.0, 0.0), (0.1, -0.2, 0.0), (0.1, 0.2, 2.0)])
