@@ -121,9 +121,11 @@ class JointDrive:
         Torque along the motion is limited to τ_max up to 0.7 of the speed limit and falls linearly
         to zero at the speed limit; torque against the motion is limited to τ_max only.
         """
-        if (_within(velocity, self._unlimited, self._slow)
-                and _within(torque, self._limit, self._weak)):
-            return torque  # as nearly always
+        if (torque.ndim == velocity.ndim == 1 and velocity.dot(velocity) <= self._slow
+                and torque.dot(torque) <= self._weak):
+            return torque  # as nearly always: their lengths are not even beyond the least limits
+        if _within(velocity, self._unlimited) and _within(torque, self._limit):
+            return torque
         lost = self._slope * velocity
         upper = np.minimum(self._limit, np.maximum(self._stall - lost, self._nothing))
         lower = np.minimum(self._limit, np.maximum(self._stall + lost, self._nothing))
@@ -131,13 +133,9 @@ class JointDrive:
         return clipped
 
 
-def _within(values: Array, limits: Array, smallest_squared: float) -> bool:
-    """Whether no value is beyond its limit, as is certain where their length is not even beyond
-    the smallest.
-    """
-    numbers = values if values.ndim == 1 else values.ravel()
-    return bool(numbers.dot(numbers) <= smallest_squared
-                or np.count_nonzero(np.abs(values) <= limits) == values.size)
+def _within(values: Array, limits: Array) -> bool:
+    """Whether no value is beyond its limit."""
+    return bool(np.count_nonzero(np.abs(values) <= limits) == values.size)
 
 
 def checked_targets(targets: JointTargets) -> Array:

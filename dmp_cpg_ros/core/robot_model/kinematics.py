@@ -124,20 +124,20 @@ class LegKinematics:
 
     def angles(self, foot_in_base: Triple) -> Triple:
         """:meth:`inverse` for and as a tuple."""
-        px, py, pz = foot_in_base
-        px, py, pz = px - self._hip[0], py - self._hip[1], pz - self._hip[2]
-        beside = self.lateral_offset
+        (px, py, pz), (hip_x, hip_y, hip_z), (o_x, _, o_z) = foot_in_base, self._hip, self._o
+        (shortest, longest), (sign_0, sign_1, sign_2) = self._reach, self._s
+        px, py, pz, beside = px - hip_x, py - hip_y, pz - hip_z, self.lateral_offset
         squared = py * py + pz * pz - beside * beside
         depth = -sqrt(1e-8 if squared < 1e-8 else squared)
         q0 = atan2(pz, py) - atan2(depth, beside)
-        x, z = px - self._o[0], depth - self._o[2]
-        length = clamped(hypot(x, z), *self._reach)
+        x, z = px - o_x, depth - o_z
+        length = clamped(hypot(x, z), shortest, longest)
         a, b = self.thigh_length, self.shank_length
         bend = acos(clamped((length * length - a * a - b * b) / (2.0 * a * b), -1.0, 1.0))
         knee = self.geometry.knee_sign * bend
         hip = atan2(-x, -z) - atan2(b * sin(knee), a + b * cos(knee))
-        return (self._s[0] * _wrapped(q0), self._s[1] * _wrapped(hip - self._thigh_angle),
-                self._s[2] * _wrapped(knee - self._shank_angle + self._thigh_angle))
+        return (sign_0 * _wrapped(q0), sign_1 * _wrapped(hip - self._thigh_angle),
+                sign_2 * _wrapped(knee - self._shank_angle + self._thigh_angle))
 
     def _chain(self, q: Array | Sequence[float]) -> tuple[float, ...]:
         q0, q1, q2 = q
