@@ -183,9 +183,11 @@ class WalkingLoop:
     def _joint_targets(self, state: RobotState, x_dot: Array, feedback: PostureFeedback,
                        dt: float) -> JointTargets:
         """Targets of all legs."""
-        legs = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
-        numbers = [number for row in range(3) for targets in legs for number in targets[row]]
-        return JointTargets(*np.array(numbers).reshape(3, -1))
+        fl, fr, rl, rr = (self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS)))
+        return JointTargets(
+            np.array((*fl.position, *fr.position, *rl.position, *rr.position)),
+            np.array((*fl.velocity, *fr.velocity, *rl.velocity, *rr.velocity)),
+            np.array((*fl.effort, *fr.effort, *rl.effort, *rr.effort)))
 
     def _leg(self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback,
              dt: float) -> LegTargets:
