@@ -239,8 +239,8 @@ class PostureController:
         reference, omega, own_omegas, duty = gait.pace(r, self.scale)
         rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]
         activity = activities_step(activity, rates, own_omegas, p.activity_rate, dt)
-        positions = [gait.scalar_cycle_position(scalar_phase(x_1, x_2) + p.target_lead * rate)
-                     for (x_1, x_2), rate in zip(x.tolist(), rates, strict=True)]
+        positions = [gait.scalar_cycle_position(scalar_phase(x_1, x_2) + p.target_lead * rates[i])
+                     for i, (x_1, x_2) in enumerate(x.tolist())]
         load = virtual_model.contact_weights(positions, duty, activity, p.load_transfer)
         return Stride(reference, omega, own_omegas, duty, positions, activity,
                       sum(activity) / len(activity), load)
@@ -272,11 +272,11 @@ class PostureController:
         caught = self.placement.caught(measured, planned, gait.apart)
         lanes = self.lanes.aside(
             gait, (*expected, stride.reference[2]), stride.omega, stride.duty)
-        shift = [(x + beside_x, y + (beside_y + aside)) for (x, y), aside in zip(
-            self.placement.shift(p, caught, planned, pi * stride.duty / stride.omega, across),
-            lanes, strict=True)]
+        wanted = self.placement.shift(
+            p, caught, planned, pi * stride.duty / stride.omega, across)
+        shift = [(x + beside_x, y + (beside_y + lanes[i])) for i, (x, y) in enumerate(wanted)]
         raised = self.placement.raised(p, shift, R_ground_base)
-        return [(x, y, up + e) for (x, y), up, e in zip(shift, raised, level, strict=True)]
+        return [(x, y, raised[i] + level[i]) for i, (x, y) in enumerate(shift)]
 
     def _ground(self, memory: PostureState, state: RobotState, forces: Sequence[float],
                 R_world_base: Matrix, normal_in_base: Triple,
@@ -339,8 +339,6 @@ class PostureController:
         forces = unfelt.borne_by_others(
             force, moment, feet, stride.load, empty, self.parameters.friction,
             LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
-        torques = [torque for on_foot, (_, J) in zip(forces, legs, strict=True)
-                   for torque in vec3.transposed_times(
-                       J, vec3.transposed_times(body.R_ground_base, on_foot))]
-        return [clamped(-torque, -most, most) for torque, most in zip(
-            torques, self._torque_limit, strict=True)]
+        torques = [torque for i, (_, J) in enumerate(legs) for torque in vec3.transposed_times(
+            J, vec3.transposed_times(body.R_ground_base, forces[i]))]
+        return [clamped(-torques[i], -most, most) for i, most in enumerate(self._torque_limit)]

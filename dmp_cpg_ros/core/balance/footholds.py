@@ -190,10 +190,8 @@ class FootPlacement:
         """
         capture = p.placement_gain * (self._leg_length / GRAVITY) ** 0.5
         way, wanted = half_stance + capture, self.over_feet(planned)
-        wished = [
-            (way * x - capture * planned_x, way * y - capture * planned_y)
-            for (x, y), (planned_x, planned_y) in zip(
-                self.over_feet(measured), wanted, strict=True)]
+        wished = [(way * x - capture * wanted[i][0], way * y - capture * wanted[i][1])
+                  for i, (x, y) in enumerate(self.over_feet(measured))]
         if across is not None and across != self._across:
             wished = [(x, y + (at - place)) for (x, y), at, place in zip(
                 wished, across, self._across, strict=True)]
@@ -224,7 +222,8 @@ class FootPlacement:
         """
         upward, limit = R_ground_base[2], LARGEST_RAISE * self._leg_length
         gain, raised = p.levelling / max(upward[2], 0.3), []
-        for (x, y, z), (more_x, more_y) in zip(self._footholds, shift, strict=True):
+        for i, (x, y, z) in enumerate(self._footholds):
+            more_x, more_y = shift[i]
             lost = z - vec3.dot((x + more_x, y + more_y, z), upward)
             raised.append(clamped(gain * lost, -limit, limit))
         return raised

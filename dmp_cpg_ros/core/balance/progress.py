@@ -45,7 +45,8 @@ def feet_behind(planned: Pair, beside: Pair, feet: Sequence[Triple],
         return 0.0
     along_x, along_y = v_x / speed, v_y / speed
     period, behind, count = 2.0 * pi / omega, 0.0, 0
-    for foot, foothold, position in zip(feet, footholds, positions, strict=True):
+    for i, foothold in enumerate(footholds):
+        foot, position = feet[i], positions[i]
         leads = along_x * foothold[0] + along_y * foothold[1] > 0.0
         if not leads or abs(position) < 0.5 * (1.0 - duty):
             continue

@@ -257,9 +257,9 @@ class Terrain(NamedTuple):
         barred = 0.0 if anew else max(0.0, self.barred - way)
         met = -1 if self.high < 0 or not swings[self.high] else self.high
         lifted, changes, changed = self._in_swings(swung, swings, touches)
-        for i, (level, share, touch) in enumerate(zip(levels, swung, touches, strict=True)):
-            if tells and touch and lifted[i] and SCUFFING[0] < share < SCUFFING[1]:
-                height = level - mean
+        for i, share in enumerate(swung):
+            if tells and touches[i] and lifted[i] and SCUFFING[0] < share < SCUFFING[1]:
+                height = levels[i] - mean
                 if height > CLIMBED * leg_length:
                     if changes[i] <= FLICKERS or share - changed[i] > STEADY:
                         barred, met = FADES * leg_length, i
@@ -268,8 +268,8 @@ class Terrain(NamedTuple):
         if barred:
             rough = max(self.rough * exp(-RELAXES * dt), (high - low) * (
                 high - low > UNEVEN * leg_length))
-        depths = [0.0 if touch or swinging else middle - level
-                  for level, touch, swinging in zip(levels, touches, swings, strict=True)]
+        depths = [0.0 if touches[i] or swings[i] else middle - level
+                  for i, level in enumerate(levels)]
         hangs = not anew and in_turn and (calm or self.gaps) and max(depths) > HOLLOW * leg_length
         gaps = FADES * leg_length if hangs else 0.0 if anew else max(0.0, self.gaps - way)
         rough = min(rough, HIGHEST * leg_length) if rough > FORGOTTEN * leg_length else 0.0
@@ -295,13 +295,11 @@ class Terrain(NamedTuple):
                    ) -> tuple[tuple[bool, ...], tuple[int, ...], tuple[float, ...]]:
         """``lifted``, ``changes`` and ``changed``."""
         lifted, changes, changed = [], [], []
-        for share, swinging, touch, before, free, count, last in zip(
-                swung, swings, touches, self.touched, self.lifted, self.changes, self.changed,
-                strict=True):
-            turned = touch != before
-            lifted.append(swinging and (free or not touch))
-            changes.append(count + turned if swinging else 0)
-            changed.append(share if turned else last)
+        for i, touch in enumerate(touches):
+            turned = touch != self.touched[i]
+            lifted.append(swings[i] and (self.lifted[i] or not touch))
+            changes.append(self.changes[i] + turned if swings[i] else 0)
+            changed.append(swung[i] if turned else self.changed[i])
         return tuple(lifted), tuple(changes), tuple(changed)
 
 
@@ -324,8 +322,8 @@ def contacts(state: RobotState, forces: Sequence[float], rests: Sequence[bool],
     quarter : float
         A quarter of the robot's weight [N].
     """
-    touches = [force > (UNLOADED if rest else LOADED) * quarter
-               for force, rest in zip(forces, rests, strict=True)]
+    touches = [forces[i] > (UNLOADED if rest else LOADED) * quarter
+               for i, rest in enumerate(rests)]
     if not any(rests):
         return touches, [*rests]
     told, efforts = state.foot_force.tolist(), state.joint_effort.tolist()

@@ -177,10 +177,10 @@ def ground_height(feet: Sequence[Triple], load: Sequence[float]) -> float:
     float
         [m]
     """
-    total, heights = sum(load), [z for _, _, z in feet]
+    total = sum(load)
     if total <= 1e-6:
-        return min(heights)
-    return sum(share * z for share, z in zip(load, heights, strict=True)) / total
+        return min([z for _, _, z in feet])
+    return sum([share * feet[i][2] for i, share in enumerate(load)]) / total
 
 
 REGULARISATION = 1e-4
@@ -308,8 +308,8 @@ def distribute(force: Triple, moment: Triple, feet: Sequence[Triple], load: Sequ
         return [(0.0, 0.0, 0.0)] * len(feet)
     pull, turn = _multipliers(force, moment, feet, load, total, importance)
     (pull_x, pull_y, pull_z), forces = pull, []
-    for foot, share in zip(feet, load, strict=True):
-        x, y, z = cross(turn, foot)
+    for i, foot in enumerate(feet):
+        (x, y, z), share = cross(turn, foot), load[i]
         x, y, z = share * (pull_x + x), share * (pull_y + y), share * (pull_z + z)
         z = clamped(z, 0.0, largest * share)
         tangential, allowed = sqrt(x * x + y * y), friction * z
@@ -324,26 +324,26 @@ def _multipliers(force: Triple, moment: Triple, feet: Sequence[Triple], load: Se
     """λ and κ of the module's text."""
     damping = REGULARISATION * max(total / len(feet), 1e-9)
     c_x = c_y = c_z = 0.0
-    for (x, y, z), share in zip(feet, load, strict=True):
+    for i, (x, y, z) in enumerate(feet):
+        share = load[i]
         c_x, c_y, c_z = c_x + share * x, c_y + share * y, c_z + share * z
     c_x, c_y, c_z = c_x / total, c_y / total, c_z / total
-    # what damping leaves of the moments of c itself
-    left = total * damping / (total + damping)
+    inertia = total + damping
+    # what damping leaves of the moments of c itself, and of the force's about the centre of mass
+    left, given = total * damping / inertia, total / inertia
     xx, yy, zz = left * c_x * c_x, left * c_y * c_y, left * c_z * c_z
     xy, xz, yz = left * c_x * c_y, left * c_x * c_z, left * c_y * c_z
-    for (x, y, z), share in zip(feet, load, strict=True):
-        x, y, z = x - c_x, y - c_y, z - c_z
+    for i, (x, y, z) in enumerate(feet):
+        x, y, z, share = x - c_x, y - c_y, z - c_z, load[i]
         xx, yy, zz = xx + share * x * x, yy + share * y * y, zz + share * z * z
         xy, xz, yz = xy + share * x * y, xz + share * x * z, yz + share * y * z
     d_x, d_y, d_z = importance
     a, b, c = damping / (d_x * d_x), damping / (d_y * d_y), damping / (d_z * d_z)
     spread = ((yy + zz + a, -xy, -xz), (-xy, xx + zz + b, -yz), (-xz, -yz, xx + yy + c))
-    given = total / (total + damping)  # of the force's moment about the centre of mass
     x, y, z = cross((c_x, c_y, c_z), force)
     turn = times(
         inverse(spread), (moment[0] - given * x, moment[1] - given * y, moment[2] - given * z))
     x, y, z = cross(turn, (c_x, c_y, c_z))
-    inertia = total + damping
     return (
         ((force[0] - total * x) / inertia, (force[1] - total * y) / inertia,
          (force[2] - total * z) / inertia),

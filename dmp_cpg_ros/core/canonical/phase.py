@@ -84,9 +84,8 @@ def scalar_phase_rate(x_1: float, x_2: float, x_1_dot: float, x_2_dot: float) ->
 
 def scalar_phase_rates(x: Array, x_dot: Array) -> list[float]:
     """As :func:`phase_rate` of a few states (N, 2), without arithmetic on arrays."""
-    return [
-        scalar_phase_rate(x_1, x_2, x_1_dot, x_2_dot)
-        for (x_1, x_2), (x_1_dot, x_2_dot) in zip(x.tolist(), x_dot.tolist(), strict=True)]
+    rates = x_dot.tolist()
+    return [scalar_phase_rate(x_1, x_2, *rates[i]) for i, (x_1, x_2) in enumerate(x.tolist())]
 
 
 def phase_rotation(phi: float) -> Array:

@@ -299,9 +299,7 @@ class GaitNetwork:
     def phase_errors(self, x: Array) -> list[float]:
         """Deviation of each leg's phase from its place, relative to the circular mean [rad]."""
         places = self.gait.phases.tolist()
-        relative = [
-            scalar_phase(x_1, x_2) - place
-            for (x_1, x_2), place in zip(x.tolist(), places, strict=True)]
+        relative = [scalar_phase(x_1, x_2) - places[i] for i, (x_1, x_2) in enumerate(x.tolist())]
         mean = atan2(sum(map(sin, relative)), sum(map(cos, relative)))
         return [(angle - mean + pi) % (2.0 * pi) - pi for angle in relative]
 

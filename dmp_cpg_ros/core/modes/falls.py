@@ -104,8 +104,8 @@ class BodySense:
         """Condition in a measured state."""
         x, y, z = upward(state.base_quaternion.tolist())
         down, legs = (-x, -y, -z), self._legs.at(state.joint_position.tolist())
-        height = max(-inf, *[dot(down, foot) + radius
-                             for (foot, _), radius in zip(legs, self._radius, strict=True)])
+        height = max(-inf, *[
+            dot(down, foot) + self._radius[i] for i, (foot, _) in enumerate(legs)])
         support = sum([force for force in state.foot_force.tolist() if force == force])  # no NaN
         support /= self._weight
         if support < CERTAIN_SUPPORT:
