@@ -186,11 +186,13 @@ class PostureController:
         R_world_base = vec3.rotation(state.base_quaternion.tolist())
         normal, share = state.ground_normal_in_world, memory.terrain.followed
         R_ground_base, upward = ground_from_base(R_world_base, normal, p.slope_following * share)
-        back, state = memory.back.felt(state, unfelt.PlannedFeet(
-            self.kinematics, self._nominal, stride.reference, stride.own_omegas, stride.duty,
-            stride.positions), stride.moving, leg_length, dt)
-        if state.feels_nothing:
-            R_ground_base = LEVEL_WITH_GROUND
+        back = memory.back
+        if back.lost or state.felt_legs is not None:
+            back, state = back.felt(state, unfelt.PlannedFeet(
+                self.kinematics, self._nominal, stride.reference, stride.own_omegas, stride.duty,
+                stride.positions), stride.moving, leg_length, dt)
+            if state.feels_nothing:
+                R_ground_base = LEVEL_WITH_GROUND
         velocity = vec3.times(R_ground_base, vec3.triple(state.base_velocity_in_base.tolist()))
         rate = vec3.times(R_ground_base, vec3.triple(state.base_rate_in_base.tolist()))
         plan, integral, offset = self._slow_loops(
@@ -329,7 +331,8 @@ class PostureController:
             return virtual_model.STRAIGHT
         sideways = abs(stride.reference[1]) / self.scale.speed(virtual_model.SIDEWAYS)
         share = stride.moving * max(0.0, 1.0 - sideways)
-        return virtual_model.LateralPlan(*(share * value for value in sway))
+        return virtual_model.LateralPlan(
+            share * sway.place, share * sway.velocity, share * sway.acceleration)
 
     def _torque(self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
                 stride: Stride, r: Triple, bounce: Bounce, acceleration: Pair,
