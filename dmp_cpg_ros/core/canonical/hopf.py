@@ -88,9 +88,7 @@ class AndronovHopf:
             ẋ [1/s].
         """
         rho, at_origin = self.rho, self.rho * self.radius**2
-        if (x.size <= FEW and x.ndim == 2 and x.dtype.char == 'd'
-                and isinstance(omega, float) and isinstance(at_origin, float)):
-            # so few numbers are read and written in less time than NumPy needs to begin
+        if self._are_few(x, omega):
             growth = np.array([complex(at_origin - rho * (x_1 * x_1 + x_2 * x_2), 0.0 - omega)
                                for x_1, x_2 in x.tolist()])
         else:
@@ -117,9 +115,24 @@ class AndronovHopf:
         -------
         ndarray (..., 2, 2)
         """
+        rho, disc = self.rho, self.radius**2
+        if self._are_few(x, omega):
+            twice = 2.0 * rho
+            of = [(rho * (disc - (x_1 * x_1 + x_2 * x_2)), x_1, x_2) for x_1, x_2 in x.tolist()]
+            return np.array([((growth - twice * x_1 * x_1, omega - twice * x_1 * x_2),
+                              (-omega - twice * x_2 * x_1, growth - twice * x_2 * x_2))
+                             for growth, x_1, x_2 in of])
         squared = x * x
-        growth = np.asarray(self.rho * (self.radius**2 - (squared[..., 0] + squared[..., 1])))
+        growth = np.asarray(rho * (disc - (squared[..., 0] + squared[..., 1])))
         return (
             np.asarray(omega)[..., None, None] * _GENERATOR
             + growth[..., None, None] * _UNIT
-            - 2.0 * np.asarray(self.rho)[..., None, None] * x[..., :, None] * x[..., None, :])
+            - 2.0 * np.asarray(rho)[..., None, None] * x[..., :, None] * x[..., None, :])
+
+    def _are_few(self, x: Array, omega: float | Array) -> bool:
+        """Whether plain floats of equal oscillators are read and written in less time than NumPy
+        needs to begin.
+        """
+        return (x.size <= FEW and x.ndim == 2 and x.dtype.char == 'd'
+                and isinstance(omega, float) and isinstance(self.rho, float)
+                and isinstance(self.radius, float))

@@ -84,7 +84,7 @@ def equilibrium_near(system: CanonicalSystem, omega: float | Array, gains: Array
     """Equilibrium that Newton's method finds from another one's state (N, 2), on the same branch:
     no real eigenvalue passed 0, as at a fold, though a pair may have (Hopf); None: it finds none.
     """
-    x = _newton(system, near, np.asarray(omega), gains)
+    x = _newton(system, near, omega, gains)
     if x is None:
         return None
     found = described(system, x, omega, gains)
@@ -101,13 +101,13 @@ def equilibrium_up_to(system: CanonicalSystem, omega: float | Array, gains: Arra
     none to begin with.
     """
     x = known if known is not None else _newton(
-        system, system.target.copy(), 0.0 * np.asarray(omega), gains)
+        system, system.target.copy(), 0.0 * omega, gains)
     if x is None:
         return None, 0.0
     step = 0.5
     for _ in range(_MOST_STEPS):
         ahead = min(1.0, share + step)
-        following = _newton(system, x, ahead * np.asarray(omega), gains,
+        following = _newton(system, x, ahead * omega, gains,
                             _CONVERGED if ahead == 1.0 else _ON_THE_WAY)
         if following is not None:
             x, share, step = following, ahead, 1.5 * step
@@ -128,7 +128,7 @@ def described(system: CanonicalSystem, x: Array, omega: float | Array, gains: Ar
         float(np.linalg.norm(system.field(x, omega, gains), axis=1).max()), -float(rates.max()))
 
 
-def _newton(system: CanonicalSystem, x: Array, omega: Array, gains: Array,
+def _newton(system: CanonicalSystem, x: Array, omega: float | Array, gains: Array,
             converged: float = _CONVERGED) -> Array | None:
     """Newton's iteration; None when it does not settle close to where it began."""
     start, limit = x, converged * (float(np.abs(system.linear_part(gains)[0]).max()) + 1.0)

@@ -11,7 +11,6 @@ not. The nodes must be in their places when they vote, so that they enter their 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import lru_cache
 from itertools import combinations, permutations
 from typing import NamedTuple
@@ -28,6 +27,7 @@ from dmp_cpg_ros.core.contraction.capture import (
 from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import exponential
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 
 MOST_PERMUTED = 5
 """Nodes of which all permutations are tried in search of symmetries."""
@@ -62,7 +62,7 @@ def shared_capture(system: CanonicalSystem, omega: float | Array, capture: Captu
     if found is None or found.spare < 1.0 + SPARE or (
             found.kept(capture.tolerance, region_radius) < 0.0):
         return capture
-    return replace(capture, needed_gain=found.needed)
+    return replace_unchecked(capture, needed_gain=found.needed)
 
 
 def growth_in(system: CanonicalSystem, omega: float | Array, capture: CaptureSet) -> Array:

@@ -7,7 +7,7 @@ certain, and below which they cannot; the clamp for which a majority does and fe
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, reduce
 from math import log
 
@@ -31,6 +31,7 @@ from dmp_cpg_ros.core.contraction.voting import (
 )
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.maths.roots import sign_change
 
 _PRECISION = 1e-4
@@ -192,14 +193,14 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
     def room(alpha: float) -> float:
         found = together(alpha)
         beyond = spare(alpha, found)
-        capture = replace(box, gains=_votes(system, voters, alpha))
+        capture = replace_unchecked(box, gains=_votes(system, voters, alpha))
         if beyond >= 0.0 and found is not None and not capture.holds:
             beyond = found.kept(box.tolerance, region_radius)
-            capture = replace(capture, needed_gain=found.needed)
+            capture = replace_unchecked(capture, needed_gain=found.needed)
         if beyond < 0.0 or inhibited_contraction(system, capture).reach == GLOBAL:
             return beyond
         rate = capture_set(system, omega, capture.gains, region_radius).rate
-        reach = inhibited_contraction(system, replace(capture, rate=rate)).reach
+        reach = inhibited_contraction(system, replace_unchecked(capture, rate=rate)).reach
         return -np.inf if reach == NONE else beyond
 
     if known > 0.0 and (known == np.inf or room(known) >= 0.0):
