@@ -1,16 +1,20 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a process asks of the C library and of Linux for itself: when it ends, what it is called,
-whose parent it becomes, and which memory it gives back.
+"""What a process asks of Python, the C library and Linux for itself: when it ends, what it is
+called, whose parent it becomes, which memory it gives back, and when it looks for garbage.
 """
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
+import gc
 
 _PR_SET_PDEATHSIG, _PR_SET_NAME, _PR_SET_CHILD_SUBREAPER = 1, 15, 36
 """Options of prctl(2)."""
+
+YOUNG_OBJECTS = 20_000
+"""New objects after which the garbage collector looks for cycles; Python's own figure is 700."""
 
 _M_MMAP_THRESHOLD = -3
 """Option of mallopt(3)."""
@@ -48,3 +52,12 @@ def give_back_memory(size: int) -> None:
     # another C library has no such function, and Windows none by this name
     with contextlib.suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, size)
+
+
+def collect_seldom() -> None:
+    """Look for garbage now, keep what is left, and look seldom from now on: the collector would go
+    through it in the midst of a tick or a verdict, which leave no cycles behind.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(YOUNG_OBJECTS)

@@ -4,7 +4,8 @@
 
 Settings have any graph, any inhibited legs, votes or none and one to three gaits; a change is of
 one to three parameters or of the gait, some of it while the cadence is on its way to another. What
-is told is the time of a processor, for another process may judge beside the ticks.
+is told is the time of a processor, for another process may judge beside the ticks, and looks for
+garbage after its answers.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.verdict import Change
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.process import collect_seldom
 from dmp_cpg_ros.studies import adversary_draws
 from dmp_cpg_ros.studies.certificate_settings import SCALE
 from dmp_cpg_ros.studies.oscillator_loop import gaits_of
@@ -67,6 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rng = np.random.default_rng(options.seed)
     judged, tell = list[Judged](), Progress()
     while len(judged) < options.changes:
+        collect_seldom()
         judged += _judged(rng)
         tell(f'{len(judged)}/{options.changes}')
     print(markdown_table(

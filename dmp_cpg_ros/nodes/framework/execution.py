@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import contextlib
 import faulthandler
-import gc
 import os
 import signal
 import sys
@@ -41,6 +40,7 @@ from dmp_cpg_ros.nodes.framework.middleware import (
     without_ros_arguments,
 )
 from dmp_cpg_ros.nodes.framework.parameters import BATCH, NodeParameters, help_text
+from dmp_cpg_ros.process import collect_seldom
 from dmp_cpg_ros.suite_table import KINDS
 
 if TYPE_CHECKING:
@@ -77,9 +77,6 @@ def schedule(policy: str) -> int:
 
 FOREVER_S = 1e6
 """A bounded wait: unbounded ones of the events executor do not work in some builds [s]."""
-
-YOUNG_OBJECTS = 20_000
-"""New objects after which the garbage collector looks for cycles; Python's own figure is 700."""
 
 TORN_DOWN_S, ENDED_S = 10.0, 120.0
 """What the middleware may take to end, once a node has completed what it does, and all of an end
@@ -159,11 +156,7 @@ def spin(nodes: Sequence[Node], kind: str, until: Future) -> None:
     """
     context = nodes[0].context
     executor = make_executor(kind, context)
-    # What start-up made stays; without this the collector would look through it in mid-tick. Ticks
-    # leave no cycles behind, so it need not look often at what they make.
-    gc.collect()
-    gc.freeze()
-    gc.set_threshold(YOUNG_OBJECTS)
+    collect_seldom()
     try:
         for node in nodes:
             executor.add_node(node)

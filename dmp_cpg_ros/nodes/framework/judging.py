@@ -23,6 +23,8 @@ from collections.abc import Callable, Generator
 from functools import lru_cache, partial
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
+from dmp_cpg_ros.process import collect_seldom
+
 if TYPE_CHECKING:
     from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 
@@ -193,6 +195,7 @@ def main() -> None:
     with contextlib.suppress(EOFError, BrokenPipeError):
         while True:
             _answer(pickle.load(questions), answers)
+            collect_seldom()
 
 
 def _answer(compute: Compute, answers: IO[bytes]) -> None:
