@@ -10,7 +10,7 @@ from core_examples import differences
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.hopf import FEW, AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import (
     phase,
     phase_generator,
@@ -121,3 +121,13 @@ def test_states_of_another_type_of_number_have_the_same_field(kind: type) -> Non
 def test_impossible_oscillators_are_refused(values: tuple[float, float]) -> None:
     with pytest.raises(ParameterError, match='positive finite'):
         AndronovHopf(*values)
+
+
+def test_few_oscillators_are_as_many() -> None:
+    """Up to ``FEW`` numbers are plain floats, more are arrays: of one formula."""
+    many = np.random.default_rng(5).uniform(-1.5, 1.5, (FEW, 2))
+    of = AndronovHopf(rho=8.0, radius=0.7)
+    for few in (many[:2], many[:FEW // 2]):
+        for compute in (of.field, of.jacobian):
+            np.testing.assert_allclose(
+                compute(few, 9.0), compute(many, 9.0)[:len(few)], rtol=1e-13, atol=1e-13)
