@@ -10,7 +10,9 @@ is limp whose three joints move and give nothing; one that has given what nobody
 power, and carries. One is wild whose torques vary by much that has nothing to do with τ*: the
 smaller of their variance and ∫ τ² − (∫ τ τ*)² / ∫ τ*². Limp or wild, a leg is lame: the robot lies
 down, and cuts the leg off where it can. Once its power is back what it gave before does not count,
-and what it gives without being asked at first cuts it off again.
+and what it gives without being asked at first cuts it off again. One reading alone tells of no
+joint that it fails and of no leg that it is limp: where a foot lands between the last torque and
+the reading, the drive could not know the velocity for which τ* is asked.
 
 Motors behind a bus act by commands of some periods ago, nobody knows how many. Of them τ* is what
 is nearest to τ between all that the targets of that time have asked for.
@@ -117,6 +119,8 @@ class DriveWatch:
         # Means over squared limits: τ* by both laws, friction, τ; τ*² by both (the second first),
         # τ τ* by both, τ², q̇².
         self._means, self._news = np.zeros((2, 10, len(self._names)))
+        self._failing_now, self._limp_now = (  # by what was last seen
+            np.zeros(size, dtype=bool) for size in (len(self._names), len(LEGS)))
         self._strange_ns = np.full(len(LEGS), -STRANGE_NS)
         self._lame_ns = np.full(len(LEGS), -WELL_NS)
         self._back_ns = np.full(len(LEGS), -TRIED_NS)  # when its power came back
@@ -140,6 +144,7 @@ class DriveWatch:
             return
         if told is None or not 0 < after_ns <= LONGEST_NS:
             self._means = np.zeros_like(self._means)
+            self._failing_now[:] = self._limp_now[:] = False
             self._before.clear()
             self.offsets.forget()
             return
@@ -163,6 +168,9 @@ class DriveWatch:
             self._reports = bool((much & (shared > WORKS * power)).any())
             return
         failing = (much & (shared < FOLLOWS * power)).all(axis=0)
+        if failing.any():
+            failing &= (news[6:8] < FOLLOWS * news[5:3:-1]).all(axis=0)
+        failing, self._failing_now = failing & self._failing_now, failing
         if self.cuts and self.lame:
             failing |= np.repeat([leg in self.lame for leg in LEGS], len(JOINTS_OF_LEG))
         if self.offsets.known:
@@ -212,6 +220,10 @@ class DriveWatch:
         self._strange_ns = np.where(strangely, now, self._strange_ns)
         limp = ((asked > MUCH * MUCH) & (np.maximum(reported, explained) < LIMP * asked)
                 & (moves > MOVES * MOVES) & (now - self._strange_ns > STRANGE_NS))
+        if limp.any():
+            asked, *shared, reported = self._news[5:9].reshape(4, len(LEGS), -1).sum(axis=2)
+            limp &= np.maximum(reported, np.maximum(*shared)) < LIMP * asked
+        limp, self._limp_now = limp & self._limp_now, limp
         followed = (np.maximum(means[6:8], 0.0) ** 2 / np.maximum(means[5:3:-1], 1e-9)).max(axis=0)
         kicks = np.minimum(means[8] - mean * mean, means[8] - followed)
         wild = kicks.reshape(len(LEGS), -1).sum(axis=1) > WILD

@@ -171,6 +171,24 @@ def test_a_leg_that_gives_what_nobody_asks_for_once_its_power_is_back_is_cut_off
     assert any(still_limp.run(0.0, 1.0) for _ in range(20))
 
 
+@pytest.mark.parametrize('rate', [50, 100, 250])
+def test_a_blow_between_the_last_torque_and_a_reading_makes_no_leg_limp(rate: int) -> None:
+    """A foot that lands after the drive's last torque changes the velocity for which it is judged:
+    at 50 Hz one such reading is most of what is remembered.
+    """
+    robot = MujocoRobot()
+    state, watch = robot.reset(), DriveWatch(robot.description)
+    kp, kd = robot.description.kp[0], robot.description.kd[0]
+    watch.cuts, leg, tick_ns = True, np.repeat([of == 'rl' for of in LEGS], 3), 10**9 // rate
+    for tick in range(1, 4 * rate):
+        ahead, blow = 0.1 if tick < rate else 0.02, 5.0 * leg * (tick % 20 == 19)  # [rad], [rad/s]
+        watch.see(replace(state, time_ns=tick * tick_ns, joint_velocity=0.6 * leg - blow,
+                          joint_effort=ahead * kp - kd * 0.6 * leg))
+        watch.tell(tick * tick_ns, JointTargets(
+            state.joint_position + ahead, *np.zeros((2, 12))))
+        assert not watch.lame and not watch.failing
+
+
 def test_drives_that_never_reported_a_torque_are_not_judged() -> None:
     robot = MujocoRobot()
     state, still = robot.reset(), np.zeros(12)
