@@ -160,8 +160,9 @@ class RobotParameters(DriveParameters):
         0.0, 'joints start at the home pose plus a uniform draw from plus or minus this', 0.0, 0.3,
         unit='rad')
     longest_lag: float = parameter(
-        0.024, "real time: age of a leg's targets beyond which the simulation waits for newer "
-        'ones, up to target_timeout of wall time; 0: it never waits', 0.0, 10.0, unit='s')
+        0.03, "real time: how long after their time a leg's targets may still act; rather than "
+        'that the simulation waits for newer ones, up to target_timeout of wall time; 0: it never '
+        'waits', 0.0, 10.0, unit='s')
     viewer: bool = parameter(False, 'whether to open a window with the robot')
     live_view: bool = parameter(
         False, 'whether to serve live_view, the suite in a browser, whose address is printed')

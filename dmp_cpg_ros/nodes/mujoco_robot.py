@@ -78,6 +78,13 @@ it leads to runs before its publication ends.
 """
 
 
+def acts_too_long(age_ns: int, tick_ns: int, longest_ns: int) -> bool:
+    """Whether targets of an age beyond their time would act for longer than they may by the end of
+    the coming tick [ns]; new ones never do, nor any where ``longest_ns`` is 0.
+    """
+    return age_ns > 0 and 0 < longest_ns < age_ns + tick_ns
+
+
 class MujocoRobotNode(DrivenRobot):
     """Publishes the robot's state at every control tick and moves its joints to their targets."""
 
@@ -386,7 +393,7 @@ class MujocoRobotNode(DrivenRobot):
         the robot fall.
         """
         now, lag = self._state.time_ns, round(self._options.longest_lag * 1e9)
-        if lag == 0 or self._guard.age_ns(now) <= lag:
+        if not acts_too_long(self._guard.age_ns(now), self._tick_ns, lag):
             self._waits = 0
             return False
         self._waits += 1

@@ -135,6 +135,12 @@ DELAYS_MS = ((0.0, 0.0), (16.0, 16.0), (20.0, 20.0), (24.0, 24.0), (40.0, 40.0),
              (5.0, 50.0))
 """Least and longest delays of their targets [ms]."""
 
+SLOW_RATES = ((100.0, 10.0), (100.0, 20.0), (50.0, 0.0), (50.0, 20.0))
+"""Control rates [Hz] and delays [ms] at which they walk, too."""
+
+SLOW_WALKS = (('amble', 0.5), ('amble', 0.8), ('amble', 1.0), ('trot', 1.0))
+"""Gaits and speeds of those walks."""
+
 STARVED = (Stalls(300.0, 150.0), Stalls(150.0, 200.0),
            Stalls(300.0, 250.0, 0.2, 0.3))
 """Stalls of walks whose controllers starve."""

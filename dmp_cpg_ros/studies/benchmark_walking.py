@@ -9,8 +9,9 @@ starting, changing gait and turning. unpushed: stops that nobody pushes against.
 seeds that cross 5 m of rough ground; rougher, higher: of harder grounds, and of stairs on a robot
 with longer legs. obstacles: steps that are too high. contacts: rough ground with and without the
 feedback of touchdown and the stumbling reflex. climbing: stairs without and with what all legs
-share of one foot's step. delays: targets that arrive late. starved: those of controllers that do
-not get to run. mismatch: a robot that is not as its controllers know it.
+share of one foot's step. delays: targets that arrive late; slow_rates: also where a tick is long.
+starved: those of controllers that do not get to run. mismatch: a robot that is not as its
+controllers know it.
 gaits: every ordered pair of gaits changed while moving; fast_gaits: at the highest speeds,
 forwards and backwards, of other robots too; returns: while they are told to go back, and stopped.
 restarts: posture control that forgets all in the
@@ -119,6 +120,19 @@ def delays(workers: Workers, seeds: int, phases: int) -> Table:
                      str(lead), f'{len(of) - len(upright)}/{seeds}', *means))
     return Table('Targets that arrive late', ('gait, m/s', 'delay ms', 'target_lead ms', 'fell',
                                               'reached m/s', 'tilt rms deg'), rows, results)
+
+
+def slow_rates(workers: Workers, seeds: int, phases: int) -> Table:
+    """Falls by the delay of the targets where a tick is long."""
+    cells = list(product(given.SLOW_RATES, given.SLOW_WALKS))
+    results = run(workers, late_walks.late, [
+        {'gait': gait, 'speed': speed, 'delay_ms': (delay, delay), 'lead_ms': 0, 'seed': seed + 1,
+         'rate': rate} for (rate, delay), (gait, speed) in cells for seed in range(seeds)])
+    rows = [(f'{gait} {speed:g}', f'{rate:g}', f'{delay:g}',
+             f'{sum(one.fell for one in of)}/{seeds}')
+            for ((rate, delay), (gait, speed)), of in by_cell(cells, results)]
+    return Table('Late targets at slow rates',
+                 ('gait, m/s', 'control_rate Hz', 'delay ms', 'fell'), rows, results)
 
 
 def starved(workers: Workers, seeds: int, phases: int) -> Table:
@@ -298,8 +312,8 @@ def robots(workers: Workers, seeds: int, phases: int) -> Table:
 TABLES = {make.__name__: make for make in (
     speeds, benchmark_pushes.pushes, benchmark_pushes.timing, benchmark_pushes.manoeuvres,
     benchmark_pushes.unpushed, grounds.rough, grounds.rougher, grounds.higher, grounds.obstacles,
-    grounds.contacts, grounds.climbing, delays, starved, mismatch, gaits, fast_gaits, returns,
-    restarts, robots)}
+    grounds.contacts, grounds.climbing, delays, slow_rates, starved, mismatch, gaits, fast_gaits,
+    returns, restarts, robots)}
 """What can be measured."""
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.loop import Tick
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
-from dmp_cpg_ros.core.suite_parameters import RobotParameters
+from dmp_cpg_ros.core.suite_parameters import RobotParameters, TickParameters
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.studies.walking_trials import Walk, attitude
 
@@ -45,15 +45,19 @@ class LateWalk(Walk):
         ``target_lead`` [ms].
     seed : int
         Of the delays and, as for :class:`Walk`, of the start.
+    rate : float
+        ``control_rate`` [Hz].
     """
 
-    def __init__(self, gait: str, delay_ms: tuple[float, float], lead_ms: int, seed: int) -> None:
+    def __init__(self, gait: str, delay_ms: tuple[float, float], lead_ms: int, seed: int,
+                 rate: float = TickParameters.control_rate) -> None:
         self._delay_ms, self._lead_ms = delay_ms, lead_ms
         self._random = np.random.default_rng(seed)
         self._guard: CommandWatchdog | None = None
         self._on_the_way: list[list[tuple[int, int, JointTargets]]] = [[] for _ in LEGS]
         self._arrival_ns = [0] * len(LEGS)
-        super().__init__(gait, seed=seed, values=(('target_lead', 1e-3 * lead_ms),))
+        super().__init__(gait, seed=seed, values=(
+            ('target_lead', 1e-3 * lead_ms), ('control_rate', rate)))
 
     def acting(self, tick: Tick) -> JointTargets:
         """Send what the legs want, and take of it what the robot's watchdog gives out."""
@@ -86,10 +90,10 @@ class LateOutcome:
     tilt: float = nan
 
 
-def late(gait: str, speed: float, delay_ms: tuple[float, float], lead_ms: int, seed: int
-         ) -> LateOutcome:
+def late(gait: str, speed: float, delay_ms: tuple[float, float], lead_ms: int, seed: int,
+         rate: float = TickParameters.control_rate) -> LateOutcome:
     """Ramp to a speed [m/s] and hold it for ``LATE_S``; see :class:`LateWalk`."""
-    run = LateWalk(gait, delay_ms, lead_ms, seed)
+    run = LateWalk(gait, delay_ms, lead_ms, seed, rate)
     if not (run.settle((speed, 0.0, 0.0)) and run.walk(LATE_S)):
         return LateOutcome(True)
     states = run.states[-round(LATE_S / run.tick_s):]

@@ -168,6 +168,19 @@ def test_a_robot_whose_controllers_starve_again_and_again_stands_instead_of_star
     assert not outcome.fell and outcome.stood
 
 
+@pytest.mark.parametrize(('rate', 'borne_ms'), [
+    (50, 0), (100, 20), (125, 16), (250, 24), (500, 28)])
+def test_the_simulation_waits_rather_than_let_targets_act_too_long(
+        rate: int, borne_ms: int) -> None:
+    """At 50 Hz those that come a tick late throw over an amble that bears 20 ms at 100 Hz."""
+    acts_too_long = pytest.importorskip('dmp_cpg_ros.nodes.mujoco_robot').acts_too_long
+    tick_ns, longest_ns = 10**9 // rate, round(1e9 * RobotParameters().longest_lag)
+    ages = [age for age in range(0, 10**8, tick_ns)
+            if not acts_too_long(age, tick_ns, longest_ns)]
+    assert max(ages) == borne_ms * 1_000_000 and 0 in ages
+    assert not acts_too_long(10**9, tick_ns, 0)
+
+
 def test_who_has_looked_after_itself_again_and_again_follows_later_each_time(
         standing: PerfectTrackingRobot) -> None:
     state, guard, now = standing.reset(), make_guard(standing.description), 0
