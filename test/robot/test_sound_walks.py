@@ -21,6 +21,7 @@ WALKS: dict[str, tuple[str, float, float, dict[str, Any]]] = {
     'pushed trot': ('trot', 1.5, 1.0, {}),
     'pace': ('pace', 0.6, 0.0, {}),
     'bound on blocks': ('bound', 0.5, 0.0, {'world': 'blocks'}),
+    'bound on blocks at 50 Hz': ('bound', 0.5, 0.0, {'world': 'blocks', 'control_rate': 50.0}),
     'pronk': ('pronk', 0.5, 0.5, {}),
     'noise times ten': ('trot', 1.0, 0.6, {'sensor_noise': 10.0}),
     'slope': ('amble', 0.5, 0.0, {'world': 'slope', 'world_degrees': 12.0}),
