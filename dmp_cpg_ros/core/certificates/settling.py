@@ -34,6 +34,7 @@ HORIZON = 10.0
 """Time beyond which a bound is of no use [s]."""
 
 _BLOCK, _BLOCKS = 32, 4  # cells of a block, and blocks looked at at once
+_BEYOND = 1.0 + 1e-9  # rounding of what is not looked at
 _KEPT = 64  # of what does not depend on who is inhibited
 
 
@@ -69,38 +70,75 @@ def settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed:
         return (span.omega_slope * np.maximum(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r,
                 span.omega_slope * speed * r)
 
-    turning, away = map(float, drive(np.array(speed)))
-    of = _falling(s, capture, turning, away) if step is None else _falling_in_steps(
-        s, capture, step)
+    of = _falling(s, capture, *map(float, drive(np.array(speed)))) if step is None else (
+        _falling_in_steps(s, capture, step))
     fade, cells = math.exp(-alpha_r * of.cell), int(HORIZON / of.cell)
     if a_b == 0.0 and not speed * fade ** (cells - 1) <= 1.001 * REST_SPEED:
         return math.inf
     swings = _filtered(math.exp(-s.parameters.leg.activity_rate * of.cell))
-    carried, fed = _in_a_block(of)
-    bounds, activity = of.start, np.ones((1, N))
+    n, m = of.start.shape
+    carried, fed, apart = _carried(of.carry), None, float(of.inner.min()) > 1e-12
+    blocks, swinging = np.empty((_BLOCKS, (_BLOCK + 1) * n, m)), np.empty((_BLOCKS, _BLOCK + 1, N))
+    bounds, followed = of.start, np.ones((_BLOCK + 1, N))
     for begin in range(0, cells, _BLOCKS * _BLOCK):
         speeds, speed = _slowing(speed, fade, a_b * of.cell)
-        within, swinging = list[Array](), list[Array]()
-        for driven in np.stack(drive(speeds), axis=1).reshape(_BLOCKS, fed.shape[1], -1):
-            block = (carried @ bounds + fed @ driven).reshape(_BLOCK + 1, *bounds.shape)
-            within.append(block[:-1].swapaxes(1, 2).reshape(_BLOCK, -1)[:, -2 * N:])
-            bounds = block[-1]
-        v, e = np.concatenate(within).reshape(-1, 2, N).swapaxes(0, 1)
+        driven = speeds[0] > 0.0
+        if driven:
+            fed = _fed(of, carried) if fed is None else fed
+            drives = np.stack(drive(speeds), axis=1).reshape(_BLOCKS, fed.shape[1], -1)
+        for k, block in enumerate(blocks):
+            carried.dot(bounds, out=block)
+            if driven:
+                block += fed.dot(drives[k])
+            bounds = block[-n:]
+        within = blocks.reshape(_BLOCKS, _BLOCK + 1, n, m).swapaxes(2, 3).reshape(
+            _BLOCKS, _BLOCK + 1, -1)[:, :-1, -2 * N:]
+        v, e = within[..., :N], within[..., N:]
         inner = np.maximum(of.inner, rest.radius - e)
-        phase_rate = np.divide(v, inner, out=np.full_like(v, np.inf), where=inner > 1e-12)
-        for wanted in np.minimum(1.0, phase_rate / span.omega_armed[0]).reshape(
-                _BLOCKS, _BLOCK, N):
-            block = swings @ np.concatenate([activity, wanted])
-            swinging.append(block[:-1])
-            activity = block[-1:]
-        resting = np.flatnonzero(
-            (phase_rate.max(axis=1) <= supervisor.REST_PHASE_RATE)
-            & (speeds <= REST_SPEED)
-            & (np.concatenate(swinging).max(axis=1) <= supervisor.REST_ACTIVITY))
-        if len(resting) > 0:
-            cell = begin + int(resting[0])
-            return cell * of.cell if cell < cells else math.inf
+        phase_rate = v / inner if apart else np.divide(
+            v, inner, out=np.full_like(v, np.inf), where=inner > 1e-12)
+        wanted = np.minimum(1.0, phase_rate / span.omega_armed[0])
+        for follows, activity in zip(wanted, swinging, strict=True):
+            followed[1:] = follows
+            swings.dot(followed, out=activity)
+            followed[0] = activity[-1]
+        slow = (phase_rate.max(axis=2).ravel() <= supervisor.REST_PHASE_RATE) & (
+            speeds <= REST_SPEED)
+        if slow.any():
+            resting = np.flatnonzero(slow & (
+                swinging[:, :-1].max(axis=2).ravel() <= supervisor.REST_ACTIVITY))
+            if len(resting) > 0:
+                cell = begin + int(resting[0])
+                return cell * of.cell if cell < cells else math.inf
+        falling = (bounds <= block[-2 * n:-n]).all()
+        if falling and _too_slow(of, rest, carried[-n:], bounds, cells - begin):
+            break
     return math.inf
+
+
+def _too_slow(of: _Falling, rest: InhibitedEquilibrium, carry: Array, bounds: Array, cells: int
+              ) -> bool:
+    """Whether phases are not at rest some cells after those that were looked at began, for what
+    falls, and is fed ever less, falls for ever; without what feeds it, it would be smaller.
+
+    Parameters
+    ----------
+    of, rest
+        Those of :func:`settling`.
+    carry : ndarray (n, n)
+        Of bounds in a block.
+    bounds : ndarray (n, m)
+        After the blocks that were looked at, which are as many as are to come at once.
+    cells : int
+        Cells until the horizon, with those that were looked at.
+    """
+    together = carry.dot(carry)
+    together = together.dot(together)
+    for _ in range(_BLOCKS * _BLOCK, cells, _BLOCKS * _BLOCK):
+        bounds = together.dot(bounds)
+    v, e = bounds.T.reshape(-1)[-2 * len(of.inner):].reshape(2, -1)
+    return bool((v > _BEYOND * supervisor.REST_PHASE_RATE * np.maximum(
+        of.inner, rest.radius - e)).any())
 
 
 class _Falling(NamedTuple):
@@ -154,41 +192,47 @@ def _falling(s: Setting, capture: CaptureSet, turning: float, away: float) -> _F
 
 def _falling_in_steps(s: Setting, capture: CaptureSet, step: SteppedNetwork) -> _Falling:
     """Of the step, some of which make a cell; what it has moved is bounded too."""
-    r, u, none = s.network.parameters.radius, step.distance, np.zeros_like(step.moved)
-    fastest, idle = _fastest(s, capture.gains, u, step.disc), none[0]
+    r, u = s.network.parameters.radius, step.distance
+    fastest = _fastest(s, capture.gains, u, step.disc)
     start = np.concatenate([np.minimum(2.0 * u, step.moved @ fastest), fastest, 2.0 * u])
-    each = np.block([[step.differences, none, none], [*step.rates, none],
-                     [none, none, step.differences]])
-    kicks = np.stack([
-        np.concatenate([step.forced, np.full(len(u), step.disc / r), idle]) * step.step_s,
-        np.concatenate([idle, idle, step.forced])], axis=1)
+    n = len(u)
+    each, kicks = np.zeros((3 * n, 3 * n)), np.zeros((3 * n, 2))
+    each[:n, :n] = each[2 * n:, 2 * n:] = step.differences
+    each[n:2 * n, :n], each[n:2 * n, n:2 * n] = step.rates
+    kicks[:n, 0], kicks[n:2 * n, 0] = step.forced * step.step_s, step.disc / r * step.step_s
+    kicks[2 * n:, 1] = step.forced
     carry, feed = np.eye(len(each)), 0.0 * kicks
     count = max(1, round(STEP / step.step_s))
     for _ in range(count):
-        carry, feed = each @ carry, each @ feed + kicks
+        carry, feed = each.dot(carry), each.dot(feed) + kicks
     return _Falling(count * step.step_s, start[:, None], carry, feed, np.maximum(r - u, 0.0))
 
 
-def _in_a_block(of: _Falling) -> tuple[Array, Array]:
-    """Matrices that make of bounds, and of what feeds them in each cell of a block, those at the
-    ends of all its cells, the first included.
+def _carried(carry: Array) -> Array:
+    """Matrix that makes of bounds those at the ends of all cells of a block, the first included.
     """
-    n, carry = len(of.start), of.carry
-    powers = np.eye(n)
-    while len(powers) < _BLOCK * n:
-        powers, carry = np.concatenate([powers, powers @ carry]), carry @ carry
-    fed = np.zeros((_BLOCK + 1, *of.feed.shape))                 # the last: of cells to come
-    fed[:_BLOCK] = (powers @ of.feed).reshape(_BLOCK, *of.feed.shape)
-    return np.concatenate([powers, carry]), fed.swapaxes(0, 1)[:, _SINCE].swapaxes(0, 1).reshape(
-        (_BLOCK + 1) * n, -1)
+    n = len(carry)
+    powers = np.empty(((_BLOCK + 1) * n, n))
+    powers[:n], known = np.eye(n), n
+    while known < _BLOCK * n:
+        powers[:known].dot(carry, out=powers[known:2 * known])
+        carry, known = carry.dot(carry), 2 * known
+    powers[known:] = carry
+    return powers
+
+
+def _fed(of: _Falling, carried: Array) -> Array:
+    """Matrix that makes of what feeds bounds in each cell of a block what it adds to them."""
+    n = len(of.start)
+    each = carried[:-n].dot(of.feed).reshape(_BLOCK, *of.feed.shape)
+    fed = np.zeros((_BLOCK + 1, n, _BLOCK, each.shape[2]))
+    for cell in range(_BLOCK):
+        fed[cell + 1:, :, cell] = each[:_BLOCK - cell]
+    return fed.reshape((_BLOCK + 1) * n, -1)
 
 
 _CELLS = np.arange(_BLOCK + 1)
 _LATER = _CELLS[:, None] - _CELLS
-_SINCE = np.where(_LATER > 0, _LATER - 1, _BLOCK)[:, :-1]
-"""Cells between one of a block that is fed and the end of another, ndarray (_BLOCK + 1, _BLOCK);
-_BLOCK where that comes first.
-"""
 
 
 @lru_cache(maxsize=_KEPT)
@@ -196,11 +240,14 @@ def _slowing(speed: float, fade: float, drop: float) -> tuple[Array, float]:
     """Speeds in the cells of the blocks that are looked at at once, and after them, where a cell
     leaves a share or takes so much away [m/s].
     """
-    speeds = list[float]()
-    for _ in range(_BLOCKS * _BLOCK):
-        speeds.append(speed)
-        speed = max(0.0, min(speed * fade, speed - drop))
-    return np.array(speeds), speed
+    speeds = np.zeros(_BLOCKS * _BLOCK)
+    for cell in range(len(speeds)):
+        if speed == 0.0:
+            break
+        speeds[cell] = speed
+        faded, dropped = speed * fade, speed - drop
+        speed = faded if faded < dropped else dropped if dropped > 0.0 else 0.0
+    return speeds, speed
 
 
 @lru_cache(maxsize=_KEPT)

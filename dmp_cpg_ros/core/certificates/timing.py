@@ -46,7 +46,7 @@ def time_to_rest(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium | N
     rest : InhibitedEquilibrium or None
         Equilibrium at zero reference.
     step : SteppedNetwork, optional
-        What is proved of the step; where it is, the bound is the larger of its and the equation's.
+        What is proved of the step, where that is to be bounded and not the equation.
 
     Returns
     -------
@@ -63,10 +63,7 @@ def time_to_rest(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium | N
     arriving = max(0.0, s.way - s.arc) / span.omega_armed[0]
     slowed = min(span.armed_speed * math.exp(-alpha_r * arriving), max(
         0.0, span.armed_speed - s.parameters.reference.braking * arriving))
-    settled = settling(s, capture, rest, slowed)
-    if step is not None and step.proved:
-        settled = max(settled, settling(s, capture, rest, slowed, step))
-    return arming + arriving + settled + DELAY_TICKS * s.tick_s
+    return arming + arriving + settling(s, capture, rest, slowed, step) + DELAY_TICKS * s.tick_s
 
 
 def time_to_walking(s: Setting, found: Synchronisation, rest: InhibitedEquilibrium | None
