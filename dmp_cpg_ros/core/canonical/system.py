@@ -51,7 +51,6 @@ class CanonicalSystem:
             if target is None
             else np.asarray(target, dtype=float))
         self._coupling = graph.coupling_matrix()
-        self._own = np.kron(np.eye(graph.size, dtype=bool), np.ones((2, 2), dtype=bool))
         self._steps: dict[tuple[bytes, float], ExponentialStep] = {}
         self._linear: dict[bytes, tuple[Array, Array]] = {}
 
@@ -125,8 +124,9 @@ class CanonicalSystem:
         -------
         ndarray (2N, 2N)
         """
-        matrix = self.linear_part(gains)[0].copy()
-        matrix[self._own] += self.oscillators.jacobian(x, omega).ravel()
+        matrix, n = self.linear_part(gains)[0].copy(), len(x)
+        own = np.ndarray((n, 2, 2), float, matrix, 0, (32 * n + 16, 16 * n, 8))  # on the diagonal
+        own += self.oscillators.jacobian(x, omega)
         return matrix
 
     def newton_step(self, x: Array, omega: float | Array, gains: Array, field: Array) -> Array:
