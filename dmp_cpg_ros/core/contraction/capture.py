@@ -20,7 +20,6 @@ nodes away from the origin, where oscillators diverge, and gives contraction on 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -46,6 +45,8 @@ RADIUS_TOLERANCE = 0.02
 
 PLACE_TOLERANCE = 0.02
 """Distance of a node from its place that the set allows at capture, as a fraction of r."""
+
+_ROUNDING = 1e-14  # share by which r and |x_d| differ that are the same
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ class CaptureSet:
     def holds(self) -> bool:
         """Whether every inhibited node's gain exceeds what it needs."""
         held = ~np.isnan(self.needed_gain)
-        return bool(np.any(held) and np.all(self.gains[held] > self.needed_gain[held]))
+        return bool(held.any() and (self.gains[held] > self.needed_gain[held]).all())
 
 
 def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
@@ -117,14 +118,14 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     gains = np.asarray(gains, dtype=float)
     if not (np.isfinite(region_radius) and region_radius > 0.0):
         raise ParameterError(f'region_radius = {region_radius!r} must be positive and finite')
-    if not (np.all(np.isfinite(omega)) and np.all(np.isfinite(gains)) and np.all(gains >= 0.0)):
+    if not (np.isfinite(omega).all() and np.isfinite(gains).all() and (gains >= 0.0).all()):
         raise ParameterError(f'frequencies {omega.tolist()} must be finite, and gains '
                              f'{gains.tolist()} finite and not negative')
     inhibited = gains > 0.0
     D, L, largest, u, needed = _box(
         system, omega.tobytes(), inhibited.tobytes(), float(region_radius))
     tolerance = places * D
-    if np.any(~inhibited):
+    if not inhibited.all():
         tolerance = min(tolerance, float(u[~inhibited].min()) - region_radius)
     if not contracts:
         return CaptureSet(u, np.zeros(size), needed, gains, tolerance, -np.inf)
@@ -185,45 +186,54 @@ def outward_growth(system: CanonicalSystem, omega: Array, D: float, u: Array) ->
     ndarray (N,)
         Upper bound [1/s].
     """
-    return np.abs(omega) * D + np.maximum(_radial_growth(system, D, u), 0.0)
+    return np.abs(omega) * D + np.maximum(_radial_growth(system.rho, system.radius, D, u), 0.0)
 
 
 def outward_growth_within(system: CanonicalSystem, omega: Array, D: float, u: Array) -> Array:
-    """Largest g_i(v) over v ≤ u_i, which rises with u as the iteration for the box needs [1/s].
+    """Largest g_i(v) over v ≤ u_i, which rises with u as the iteration for the box needs [1/s]."""
+    return np.abs(omega) * D + _radial_growth_within(system.rho, system.radius, D, u)
 
-    For r = |x_d| it is g_i itself up to where c reaches −|x_d|. Else the radial part has its other
-    maxima where c leaves or reaches ±|x_d|, or where |x| = r/√3 with x along x_d.
+
+def _radial_growth_within(rho: Array, r: Array, D: float, u: Array) -> Array:
+    """Radial part of it, ndarray (N,) [1/s].
+
+    For r = |x_d| it is g_i's itself up to where c reaches −|x_d|, and from there up to where
+    |x| = r/√3 with x along x_d. Else it has its other maxima there, or where c leaves or reaches
+    ±|x_d|.
     """
-    r = system.radius
-    if (r == D).all() and u.max() <= 4.0 / 3.0 * D:
-        return np.asarray(np.abs(omega) * D + 0.125 * system.rho * (u * u * u))
     reach = r / np.sqrt(3.0)
+    if (r == D).all():
+        v = np.minimum(u, reach + D)
+        return np.asarray(np.where(
+            v <= 4.0 / 3.0 * D, 0.125 * rho * (v * v * v), rho * (2.0 * v * D - v * v) * (v - D)))
     root = np.sqrt(np.maximum(4.0 * D**2 + 3.0 * (r**2 - D**2), 0.0))
     places = np.stack([u, 0.0 * r, reach - D, reach + D, (root - 2.0 * D) / 3.0,
                        (root + 2.0 * D) / 3.0, (2.0 * D - root) / 3.0])
-    radial = _radial_growth(system, D, np.clip(places, 0.0, u)).max(axis=0)
-    return np.abs(omega) * D + np.maximum(radial, 0.0)
+    return np.maximum(
+        _radial_growth(rho, r, D, np.clip(places, 0.0, u)).max(axis=0), 0.0)
 
 
-def _radial_growth(system: CanonicalSystem, D: float, u: Array) -> Array:
+def _radial_growth(rho: Array, r: Array, D: float, u: Array) -> Array:
     """Largest n·ρ(r² − |x|²)x over x = x_d + u n, ndarray (N,) [1/s]."""
     u = np.maximum(u, 1e-300)
-    offset = system.radius**2 - D**2 - u**2
+    offset = r**2 - D**2 - u**2
     with np.errstate(invalid='ignore'):  # what is not bounded has a growth that is no number
         c = np.clip((offset - 2.0 * u**2) / (4.0 * u), -D, D)
-        return np.asarray(system.rho * (offset - 2.0 * u * c) * (c + u))
+        return np.asarray(rho * (offset - 2.0 * u * c) * (c + u))
 
 
 def target_radius(system: CanonicalSystem, inhibited: Mask) -> float:
     """D = |x_d|; the inhibited nodes must be pulled to one state in locked coordinates."""
-    if not np.any(inhibited):
+    if not inhibited.any():
         raise ParameterError('no node is inhibited: at least one gain must be positive')
     places = np.array([phase_rotation(float(phi)).T @ target for phi, target in zip(
         system.graph.phases[inhibited], system.target[inhibited], strict=True)])
-    if np.abs(places - places[0]).max() > 1e-9 * (1.0 + np.abs(places).max()):
+    if len(places) > 1 and (
+            np.abs(places - places[0]).max() > 1e-9 * (1.0 + np.abs(places).max())):
         raise ParameterError('the targets of inhibited nodes must be in their places relative to '
                              f'each other; in locked coordinates they are {places.tolist()}')
-    return float(np.hypot(*places[0]))
+    D, r = float(np.hypot(*places[0])), float(system.radius[0])
+    return r if abs(D - r) <= _ROUNDING * r else D
 
 
 def _distances(system: CanonicalSystem, L: Array, omega: Array, inhibited: Mask, D: float,
@@ -234,45 +244,43 @@ def _distances(system: CanonicalSystem, L: Array, omega: Array, inhibited: Mask,
     where the box shrinks. A node that the inhibited ones do not reach, or
     not firmly, may be anywhere in the invariant disc.
     """
-    u = np.where(inhibited, region_radius, largest)
-    free = ~inhibited
-    solution = _grounded_solution(L, free)
+    u, free, known = np.where(inhibited, region_radius, largest), ~inhibited, False
     for _ in range(12):
-        solved = solution(outward_growth_within(system, omega, D, u), u)
-        beyond = free & (solved >= largest)
-        if np.any(beyond):                                  # fixed at the edge of the disc
-            free = free & ~beyond
-            solution = _grounded_solution(L, free)
-            u = np.where(beyond, largest, u)
+        if not known:
+            inverse = _grounded_inverse(L, free) if free.any() else None
+            if inverse is None:
+                u[free] = largest
+                break
+            known, rho, r, far = True, system.rho[free], system.radius[free], u[free]
+            turning, pulled = omega[free] * D, L[free][:, ~free].dot(u[~free])
+        solved = inverse.dot(turning + _radial_growth_within(rho, r, D, far) - pulled)
+        beyond = solved >= largest
+        if beyond.any():
+            u[free] = np.where(beyond, largest, far)        # fixed at the edge of the disc
+            free[free] = ~beyond
+            known = False
             continue
-        new = np.minimum(u, solved)
-        if np.abs(new - u).max() < 1e-12:
+        nearer = np.minimum(far, solved)
+        if np.abs(nearer - far).max() < 1e-12:
             break
-        u = new
+        u[free] = far = nearer
     return u
 
 
-def _grounded_solution(L: Array, free: Mask) -> Callable[[Array, Array], Array]:
-    """Solver of (L u)_i = g_i at the free nodes, u kept at the others; ∞ where unbounded."""
+def _grounded_inverse(L: Array, free: Mask) -> Array | None:
+    """Inverse of L at the free nodes, which makes of g the u with (L u)_i = g_i; None where that
+    is not bounded.
+    """
     heard, beside = ~free, L < 0.0
     for _ in range(len(L)):
         if heard.all():
             break
         heard = heard | (beside @ heard)
-    known, any_free = bool(np.all(heard)), bool(np.any(free & heard))
-    free, kept = free & heard, ~free & heard
-    grounded, to_kept = L[free][:, free], L[free][:, kept]
-    firm = known and any_free and slowest_rate(grounded) > 1e-9 * float(np.abs(grounded).max())
-
-    inverse = np.linalg.inv(grounded) if firm else None
-
-    def solution(g: Array, u: Array) -> Array:
-        solved = np.where(heard, u, np.inf)                 # no kept node acts on the others
-        if known and any_free:
-            solved[free] = np.inf if inverse is None else inverse @ (g[free] - to_kept @ u[kept])
-        return solved
-
-    return solution
+    if not heard.all():
+        return None
+    grounded = L[free][:, free]
+    firm = slowest_rate(grounded) > 1e-9 * float(np.abs(grounded).max())
+    return np.linalg.inv(grounded) if firm else None
 
 
 def _smallest_radii(system: CanonicalSystem, M: Array, omega: Array, u: Array, D: float,
@@ -286,24 +294,30 @@ def _smallest_radii(system: CanonicalSystem, M: Array, omega: Array, u: Array, D
     """
     inner = np.maximum(0.0, D - u)
     tiny = 1e-9 * float(np.abs(M).max())
-    if np.any(M.sum(axis=1) < -tiny) or slowest_rate(M) <= tiny:
+    if (M.sum(axis=1) < -tiny).any() or slowest_rate(M) <= tiny:
         return inner
-    beta = np.linspace(0.0, 1.2, 13)[:, None]                                # (13, 1) [rad]
-    extent = np.clip(u - D * np.sin(beta), 0.0, largest)                 # (13, N)
+    extent = np.clip(u - D * _SINE, 0.0, largest)                        # (13, N)
     loss = omega * extent + system.rho * np.maximum(largest**2 - system.radius**2, 0.0) * largest
     s = np.linalg.solve(M, loss.T).T
-    entry = _entry_height(beta, D, region_radius, float(system.radius.min())) - tolerance
-    s = s + np.maximum(0.0, (D * np.cos(beta) - entry - s).max(axis=1, keepdims=True))
-    heights = D * np.cos(beta) - s                                       # (13, N)
-    sound = np.all(heights >= 0.0, axis=1, keepdims=True)
+    entry = _entry_height(D, region_radius, float(system.radius.min())) - tolerance
+    s = s + np.maximum(0.0, (D * _COSINE - entry - s).max(axis=1, keepdims=True))
+    heights = D * _COSINE - s                                            # (13, N)
+    sound = (heights >= 0.0).all(axis=1, keepdims=True)
     return np.maximum(inner, np.where(sound, heights, 0.0).max(axis=0))
 
 
-def _entry_height(beta: Array, D: float, region_radius: float, r: float) -> Array:
+_BETA = np.linspace(0.0, 1.2, 13)[:, None]                               # (13, 1) [rad]
+_SINE, _COSINE = np.sin(_BETA), np.cos(_BETA)
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _entry_height(D: float, region_radius: float, r: float) -> Array:
     """Smallest n_β·x over the states of C with |x| ≥ (1 − RADIUS_TOLERANCE) min(|x_d|, r)."""
     inner = (1.0 - RADIUS_TOLERANCE) * min(D, r)
     cosine = (inner**2 + D**2 - region_radius**2) / (2.0 * inner * D)
-    corner = inner * np.cos(np.minimum(np.arccos(np.clip(cosine, -1.0, 1.0)) + beta, np.pi))
-    lowest = D * np.cos(beta) - region_radius                            # of all of C
-    radius_there = np.sqrt(D**2 + region_radius**2 - 2.0 * D * region_radius * np.cos(beta))
-    return np.where(radius_there >= inner, lowest, np.maximum(corner, lowest))
+    corner = inner * np.cos(np.minimum(np.arccos(np.clip(cosine, -1.0, 1.0)) + _BETA, np.pi))
+    lowest = D * _COSINE - region_radius                                 # of all of C
+    radius_there = np.sqrt(D**2 + region_radius**2 - 2.0 * D * region_radius * _COSINE)
+    found = np.where(radius_there >= inner, lowest, np.maximum(corner, lowest))
+    found.flags.writeable = False
+    return np.asarray(found)

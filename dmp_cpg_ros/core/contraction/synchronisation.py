@@ -94,7 +94,7 @@ def _without_growth(graph: CouplingGraph) -> Synchronisation:
 def _best_bound(graph: CouplingGraph, L: Array, scalar: Array) -> Synchronisation:
     """Largest connectivity of those that are proved for the graph."""
     even = np.full(graph.size, 1.0 / graph.size)
-    symmetric = np.allclose(L, L.T, rtol=0.0, atol=1e-12 * (1.0 + np.abs(L).max()))
+    symmetric = bool(np.abs(L - L.T).max() <= 1e-12 * (1.0 + np.abs(L).max()))
     best = Synchronisation(connectivity(L, graph.size), 0.0, even,
                            'symmetric' if symmetric else 'projected')
     if symmetric:
@@ -159,9 +159,16 @@ def synchronisation_complement(size: int, dimension: int = 2,
     -------
     ndarray ((N−1)n, Nn)
     """
-    direction = np.ones(size) if weights is None else np.sqrt(weights)
-    across = np.linalg.svd(direction[None])[2][1:]                           # (N-1, N)
-    return np.kron(across, np.eye(dimension))
+    return _complement((np.ones(size) if weights is None else np.sqrt(weights)).tobytes(),
+                       dimension)
+
+
+@lru_cache(maxsize=64)
+def _complement(direction: bytes, dimension: int) -> Array:
+    across = np.linalg.svd(np.frombuffer(direction)[None])[2][1:]            # (N-1, N)
+    V = np.kron(across, np.eye(dimension))
+    V.flags.writeable = False
+    return V
 
 
 def connectivity(L: Array, size: int, weights: Array | None = None) -> float:
