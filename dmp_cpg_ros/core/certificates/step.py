@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -183,12 +184,11 @@ def stepped_network(s: Setting, analysis: NetworkAnalysis) -> SteppedNetwork | N
     if not max(disc, a, b, free_stage) < _FARTHEST_STAGE * r:
         return None
     box = _Box(bounds, plain, omega * r, rho, r, (disc, a, b))
-    u, after = box.closed(capture.distance, alpha > 0.0)
-    kept = bool(np.all((after <= u) | (alpha > 0.0) | (u >= disc + r)))
+    u, (u_a, u_b, after) = box.closed(capture.distance, alpha > 0.0)
+    kept = bool(((after <= u) | (alpha > 0.0) | (u >= disc + r)).all())
     farthest = float((after / u)[alpha > 0.0].max()) if kept else math.inf
 
     # ‖κ + ∂(ρ(r² − |y|²) y)/∂y‖ is the larger of κ + ρ(r² − |y|²) and ρ(3|y|² − r²) − κ
-    u_a, u_b = box.stages(u)
     inner = [np.maximum(r - far, 0.0) for far in (
         u, np.maximum(u, u_a), np.maximum(np.maximum(u, u_a), u_b))]
     most = 3.0 * max(disc, a, b) ** 2 - r**2
@@ -197,7 +197,7 @@ def stepped_network(s: Setting, analysis: NetworkAnalysis) -> SteppedNetwork | N
     start, middle, end = (np.maximum(kappa + rho * (r**2 - least**2), rho * most - kappa)
                           for least in inner)
     Z, rates = bounds.difference(start, middle, end), bounds.rates(end)
-    slowest = max(np.abs(np.linalg.eigvals(matrix)).max() for matrix in (Z, rates[1]))
+    slowest = float(np.abs(np.linalg.eigvals(np.array([Z, rates[1]]))).max())
     return SteppedNetwork(
         u, farthest, disc, -math.log(max(slowest, 1e-300)) / h,
         _locking(s, analysis, L, h, max(disc, free_stage)), h, Z, bounds.moved(end), rates,
@@ -206,7 +206,7 @@ def stepped_network(s: Setting, analysis: NetworkAnalysis) -> SteppedNetwork | N
 
 def _disc(bound: StepBounds, pull: Array, rho_r3: float) -> float:
     """R of a disc that no step leaves whose stages are within 2r, where |Q| ≤ 2ρr³."""
-    pushed = bound.C @ pull + (bound.C_y + bound.C_a + bound.C_b).sum(axis=1) * 2.0 * rho_r3
+    pushed = bound.C.dot(pull) + (bound.C_y + bound.C_a + bound.C_b).sum(axis=1) * 2.0 * rho_r3
     kept = 1.0 - bound.T.sum(axis=1)
     return float((pushed / kept).max()) if kept.min() > 0.0 else math.inf
 
@@ -215,9 +215,9 @@ def _stages(bound: StepBounds, pull: Array, disc: float, rho: float, r: float
             ) -> tuple[float, float]:
     """Largest |a| and |b| of states within a disc."""
     start = largest_radial(rho, r, disc)
-    a = float((bound.A.sum(axis=1) * disc + bound.A_y @ (pull + start)).max())
+    a = float((bound.A.sum(axis=1) * disc + bound.A_y.dot(pull + start)).max())
     middle = largest_radial(rho, r, a)
-    return a, float((bound.B.sum(axis=1) * disc + bound.B_c @ pull + bound.B_y.sum(axis=1) * start
+    return a, float((bound.B.sum(axis=1) * disc + bound.B_c.dot(pull) + bound.B_y.sum(axis=1) * start
                      + bound.B_a.sum(axis=1) * middle).max())
 
 
@@ -234,49 +234,57 @@ class _Box:
     r: float
     largest: tuple[float, float, float]
 
+    @cached_property
+    def _steady(self) -> tuple[Array, ...]:
+        """What does not depend on the distances: ωr, and what it is to b, by either bound, and to
+        the end of the step.
+        """
+        at, plain, size = self.bound, self.plain, len(self.bound.T)
+        turning, radial = np.full(size, self.turning), largest_radial(
+            self.rho, self.r, self.largest[1])
+        return (turning, at.B_c.dot(turning), plain.B_c.dot(turning),
+                (plain.B_y + plain.B_a).dot(np.full(size, radial)), at.C.dot(turning))
+
     def _off(self, u: Array, R: float) -> Array:
         return largest_shifted(self.rho, self.r, u, R)
 
-    def stages(self, u: Array) -> tuple[Array, Array]:
-        """Distances of a and b."""
-        at, plain, turning = self.bound, self.plain, np.full(len(u), self.turning)
+    def after(self, u: Array) -> tuple[Array, Array, Array]:
+        """Distances of a, of b and after a step."""
+        at, (turning, to_b, plain_to_b, radial, to_end) = self.bound, self._steady
         R, R_a, R_b = self.largest
-        radial = largest_radial(self.rho, self.r, R_a)
         off = self._off(u, R)
-        a = np.minimum(at.A @ u + at.A_y @ (turning + off), R_a + self.r)
-        moved = at.A_moved @ u + at.A_y @ (turning + off)
+        pushed = at.A_y.dot(turning + off)
+        a = np.minimum(at.A.dot(u) + pushed, R_a + self.r)
+        moved = at.A_moved.dot(u) + pushed
         inner = np.maximum(self.r - np.maximum(u, a), 0.0)
-        change = self.rho * (3.0 * self.r**2 - inner**2) * moved           # |Q(a) − Q(y)|
-        either = np.minimum(at.B_y @ off + at.B_a @ self._off(a, R_a),
-                            at.B_c @ off + at.B_a @ change)
-        b = np.minimum(at.B @ u + at.B_c @ turning + either, plain.B @ u + plain.B_c @ turning
-                       + (plain.B_y + plain.B_a) @ np.full(len(u), radial))
-        return a, np.minimum(b, R_b + self.r)
+        change = self.rho * (3.0 * self.r**2 - inner * inner) * moved       # |Q(a) − Q(y)|
+        off_a = self._off(a, R_a)
+        either = np.minimum(at.B_y.dot(off) + at.B_a.dot(off_a),
+                            at.B_c.dot(off) + at.B_a.dot(change))
+        b = np.minimum(np.minimum(at.B.dot(u) + to_b + either, self.plain.B.dot(u) + plain_to_b
+                                  + radial), R_b + self.r)
+        return a, b, (at.T.dot(u) + to_end + at.C_y.dot(off) + at.C_a.dot(off_a)
+                      + at.C_b.dot(self._off(b, R_b)))
 
-    def after(self, u: Array) -> Array:
-        """Distances after a step."""
-        at, (R, R_a, R_b), (a, b) = self.bound, self.largest, self.stages(u)
-        turning = np.full(len(u), self.turning)
-        return np.asarray(at.T @ u + at.C @ turning + at.C_y @ self._off(u, R)
-                          + at.C_a @ self._off(a, R_a) + at.C_b @ self._off(b, R_b))
-
-    def closed(self, u: Array, held: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Box that free nodes do not leave, enlarged from one, and the distances after a step; a
-        node is anywhere in the disc where there is none.
+    def closed(self, u: Array, held: NDArray[np.bool_]
+               ) -> tuple[Array, tuple[Array, Array, Array]]:
+        """Box that free nodes do not leave, enlarged from one, and the distances of :meth:`after`;
+        a node is anywhere in the disc where there is none.
         """
         edge, slope = self.largest[0] + self.r, 2.0 * self.rho * self.r**2
         J = self.bound.T + (self.bound.C_y + self.bound.C_a + self.bound.C_b) * slope
         u = np.minimum(u, edge)
+        found = self.after(u)
         for _ in range(_MOST_TRIALS):
-            after = self.after(u)
-            moving = ~held & (u < edge)
-            if np.all(after[moving] <= u[moving]):
+            after, moving = found[2], ~held & (u < edge)
+            if (after[moving] <= u[moving]).all():
                 break
-            room = np.linalg.solve(np.eye(int(moving.sum())) - J[np.ix_(moving, moving)],
+            room = np.linalg.solve(np.eye(int(moving.sum())) - J[moving][:, moving],
                                    np.maximum(after - u, 0.0)[moving] + 1e-7 * self.r)
             u = u.copy()
-            u[moving] = np.minimum(u[moving] + room, edge) if np.all(room > 0.0) else edge
-        return u, self.after(u)
+            u[moving] = np.minimum(u[moving] + room, edge) if (room > 0.0).all() else edge
+            found = self.after(u)
+        return u, found
 
 
 def _locking(s: Setting, analysis: NetworkAnalysis, L: Array, h: float, farthest: float) -> float:

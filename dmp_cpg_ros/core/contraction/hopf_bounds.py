@@ -82,8 +82,11 @@ def largest_shifted(rho: float, radius: float, distance: Array, farthest: float)
     ndarray (...)
     """
     u = distance / radius
-    d = ((1.0 - np.sqrt(1.0 + 6.0 * u**2)) / 3.0).clip(-1.0, (farthest / radius) ** 2 - 1.0)
-    return np.asarray(rho * radius**3 * np.sqrt(4.0 * u**2 - 2.0 * u**2 * d - d**2 + d**3))
+    squared = u * u
+    d = np.minimum(np.maximum((1.0 - np.sqrt(1.0 + 6.0 * squared)) / 3.0, -1.0),
+                   (farthest / radius) ** 2 - 1.0)
+    return np.asarray(rho * radius**3 * np.sqrt(
+        4.0 * squared - 2.0 * squared * d - d * d + d * d * d))
 
 
 def transverse_rate(rho: float, radius: float, omega: float, inner: float, outer: float) -> float:

@@ -10,7 +10,8 @@ equilibrium of the step.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from math import factorial
 
 import numpy as np
 
@@ -40,9 +41,17 @@ def phi_functions(M: Array, highest: int = 3) -> list[Array]:
     block = np.zeros(((highest + 1) * n, (highest + 1) * n))
     block[:n, :n] = M
     for k in range(highest):
-        block[k * n : (k + 1) * n, (k + 1) * n : (k + 2) * n] = np.eye(n)
+        block.ravel()[k * n * len(block) + (k + 1) * n :: len(block) + 1][:n] = 1.0
     whole = exponential(block)
     return [whole[:n, k * n : (k + 1) * n] for k in range(highest + 1)]
+
+
+def phi_functions_doubled(phi: Sequence[Array]) -> list[Array]:
+    """φ₀ … φ_m of twice a matrix from those of it: φ_k(2M) = 2^(−k) (φ₀φ_k + Σ_j φ_j/(k − j)!), j
+    from 1 to k.
+    """
+    return [0.5**k * (phi[0].dot(phi[k]) + sum(
+        phi[j] / factorial(k - j) for j in range(1, k + 1))) for k in range(len(phi))]
 
 
 def exponential(M: Array) -> Array:
@@ -61,10 +70,13 @@ def exponential(M: Array) -> Array:
     unit, norm = np.eye(M.shape[-1]), float(np.abs(M).sum(axis=-2).max())
     squarings = max(0, int(np.ceil(np.log2(norm / 0.5)))) if norm > 0.0 else 0
     scaled, result = M / 2.0**squarings, unit
+    times = np.dot if M.ndim == 2 else np.matmul  # alike, but the first begins sooner
     for k in range(18, 0, -1):
-        result = unit + scaled @ result / k
+        result = times(scaled, result)
+        result /= k
+        result += unit
     for _ in range(squarings):
-        result = result @ result
+        result = times(result, result)
     return result
 
 

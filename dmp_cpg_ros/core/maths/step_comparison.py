@@ -25,15 +25,24 @@ from typing import NamedTuple
 import numpy as np
 
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.exponential import phi_functions
+from dmp_cpg_ros.core.maths.exponential import phi_functions, phi_functions_doubled
 
 _POWERS = 4  # 1, q, q², q³
 
 _BERNSTEIN = np.array([
     [comb(k, m) / comb(_POWERS - 1, m) for m in range(_POWERS)] for k in range(_POWERS)])
+_CHOOSE = np.array([[float(comb(m, k)) for m in range(_POWERS)] for k in range(_POWERS)])
+_RAISED = np.array([[max(m - k, 0) for m in range(_POWERS)] for k in range(_POWERS)])
+"""Of (q + κ)^k in q^m = Σ_k C(m, k) (−κ)^(m − k) (q + κ)^k."""
+
 _ORDERS = np.array([[[1j**m * (-1j)**k * (m + k == order) for k in range(_POWERS)]
                      for m in range(_POWERS)] for order in range(2 * _POWERS - 1)])
-"""What dᵀ_m d_k adds to each order of ω in PᴴP, P = Σ_k d_k (−iω)^k."""
+"""What dᵀ_m d_k adds to each order of ω in PᴴP, P = Σ_k d_k (−iω)^k: real for even orders,
+imaginary for odd ones.
+"""
+
+_EVEN, _ODD = (order.reshape(-1, _POWERS**2).copy()
+               for order in (_ORDERS.real[::2], _ORDERS.imag[1::2]))
 
 
 class StepBounds(NamedTuple):
@@ -85,35 +94,35 @@ class StepBounds(NamedTuple):
         b, ndarray (n,) each.
         """
         half = self.A + self.A_y * start
-        last = self.B + self.B_y * start + (self.B_a * middle) @ half
-        return self.T + self.C_y * start + (self.C_a * middle) @ half + (self.C_b * end) @ last
+        last = self.B + self.B_y * start + (self.B_a * middle).dot(half)
+        return self.T + self.C_y * start + (self.C_a * middle).dot(half) + (self.C_b * end).dot(last)
 
     def forced(self, middle: Array, end: Array) -> Array:
         """Matrix Y with Y η a bound of what parts of N up to η, others at each stage, do to y⁺."""
         half = self.A_y
-        last = self.B_y + self.B_a + (self.B_a * middle) @ half
-        return (self.C_y + self.C_a + self.C_b + (self.C_a * middle) @ half
-                + (self.C_b * end) @ last)
+        last = self.B_y + self.B_a + (self.B_a * middle).dot(half)
+        return (self.C_y + self.C_a + self.C_b + (self.C_a * middle).dot(half)
+                + (self.C_b * end).dot(last))
 
     def moved(self, lipschitz: Array) -> Array:
         """Matrix that bounds |y⁺ − y| by the rates |v| of y, where Q has given Lipschitz constants
         on all that lies between y, a, b and y⁺, ndarray (n,).
         """
         middle, end = self._changes(lipschitz)
-        return self.G + self.C_a @ middle + self.C_b @ end
+        return self.G + self.C_a.dot(middle) + self.C_b.dot(end)
 
     def rates(self, lipschitz: Array) -> tuple[Array, Array]:
         """Matrices that bound the rates |v⁺| by the sum of what they make of |y⁺ − y| and of |v|,
         likewise.
         """
         middle, end = self._changes(lipschitz)
-        return self.P + np.diag(lipschitz), self.S + self.S_a @ middle + self.S_b @ end
+        return self.P + np.diag(lipschitz), self.S + self.S_a.dot(middle) + self.S_b.dot(end)
 
     def _changes(self, lipschitz: Array) -> tuple[Array, Array]:
         """Bounds of |Q(a) − Q(y)| and |Q(b) − Q(y)| over |v|."""
         each = np.asarray(lipschitz)[:, None]
         middle = each * self.A_y
-        return middle, np.asarray(each * (self.D + self.B_a @ middle))
+        return middle, np.asarray(each * (self.D + self.B_a.dot(middle)))
 
 
 class StepComparison:
@@ -130,38 +139,36 @@ class StepComparison:
     def __init__(self, M: Array, dt: float) -> None:
         """Compute the coefficients once."""
         n, unit = len(M), np.eye(len(M))
-        whole, p_1, p_2, p_3 = phi_functions(-dt * M)
-        half, p_half = phi_functions(-0.5 * dt * M, 1)
-
-        def constant(matrix: Array) -> Array:
-            return np.concatenate([matrix[None], np.zeros((_POWERS - 1, n, n))])
-
-        def times_q(polynomial: Array) -> Array:
-            return np.concatenate([np.zeros((1, n, n)), polynomial[:-1]])
-
+        half, p_half, *_ = at_half = phi_functions(-0.5 * dt * M)
+        whole, p_1, p_2, p_3 = phi_functions_doubled(at_half)
         b_1, b_2, b_3 = (dt * (p_1 - 3.0 * p_2 + 4.0 * p_3), dt * (4.0 * p_2 - 8.0 * p_3),
                          dt * (4.0 * p_3 - p_2))
         full = dt * p_1
-        A_y, B_a, C_b = constant(0.5 * dt * p_half), constant(2.0 * full), constant(b_3)
-        A = constant(half) + times_q(A_y)
-        B = constant(whole) - times_q(constant(full)) + times_q(2.0 * full @ A)
-        B_y = -constant(full) + times_q(2.0 * full @ A_y)
-        C_y = constant(b_1) + times_q(b_2 @ A_y) + times_q(b_3 @ B_y)
-        C_a = constant(b_2) + times_q(b_3 @ B_a)
-        D = constant(full) + times_q(2.0 * full @ A_y)
-        inverse = np.linalg.inv(full)
-        self._polynomials = np.stack([
-            constant(whole) + times_q(constant(b_1)) + times_q(b_2 @ A) + times_q(b_3 @ B),
-            C_y, C_a, C_b, C_y + C_a + C_b, A, A_y, A - constant(unit), B, B_y, B_a, B_y + B_a,
-            D, constant(full) + times_q(b_2 @ A_y) + times_q(b_3 @ D),
-            constant(whole @ inverse) + times_q(constant(unit)),
-            times_q(inverse @ (b_2 @ A_y + b_3 @ D)), inverse @ C_a, inverse @ C_b])
+        twice, inverse = 2.0 * full, np.linalg.inv(full)
+        polynomials = np.zeros((_POWERS, len(StepBounds._fields), n, n))
+        T, C_y, C_a, C_b, C, A, A_y, A_moved, B, B_y, B_a, B_c, D, G, P, S, S_a, S_b = (
+            polynomials.swapaxes(0, 1))                          # of each the powers of q
+        A_y[0], B_a[0], C_b[0] = 0.5 * dt * p_half, twice, b_3
+        A[0], A[1] = half, A_y[0]
+        B[0], B[1], B[2] = whole, twice.dot(half) - full, twice.dot(A[1])
+        B_y[0], B_y[1] = -full, twice.dot(A_y[0])
+        C_y[0], C_y[1], C_y[2] = b_1, b_2.dot(A_y[0]) + b_3.dot(B_y[0]), b_3.dot(B_y[1])
+        C_a[0], C_a[1] = b_2, b_3.dot(twice)
+        D[0], D[1] = full, B_y[1]
+        T[0], T[1], T[2], T[3] = (whole, b_1 + b_2.dot(half) + b_3.dot(whole),
+                                  b_2.dot(A[1]) + b_3.dot(B[1]), b_3.dot(B[2]))
+        C[:], A_moved[:], B_c[:] = C_y + C_a + C_b, A, B_y + B_a
+        A_moved[0] -= unit
+        G[0], G[1], G[2] = full, b_2.dot(A_y[0]) + b_3.dot(full), b_3.dot(D[1])
+        P[0], P[1] = whole.dot(inverse), unit
+        S[1], S[2] = inverse.dot(G[1]), inverse.dot(G[2])
+        S_a[0], S_a[1], S_b[0] = inverse.dot(b_2), inverse.dot(C_a[1]), inverse.dot(b_3)
+        self._polynomials = polynomials
 
     def _about(self, kappa: float) -> Array:
         """Coefficients of powers of q + κ, ndarray (4, 18, n, n)."""
-        shift = [[comb(m, k) * (-kappa) ** (m - k) if m >= k else 0.0 for m in range(_POWERS)]
-                 for k in range(_POWERS)]
-        return np.tensordot(shift, self._polynomials, (1, 1))
+        shift = _CHOOSE * np.array([(-kappa) ** power for power in range(_POWERS)])[_RAISED]
+        return shift.dot(self._polynomials.reshape(_POWERS, -1)).reshape(self._polynomials.shape)
 
     def moduli(self, kappa: float, omega: float) -> StepBounds:
         """Bound the moduli of all entries for q = −κ − iω, at every |ω| up to a largest one."""
@@ -172,19 +179,29 @@ class StepComparison:
         return StepBounds(*np.sqrt(squared))
 
     def norms(self, kappa: float, omega: float) -> StepBounds:
-        """Bound the 2-norms likewise, as arrays (1, 1): PᴴP is a polynomial in ω with Hermitian
-        coefficients.
+        """Bound the 2-norms likewise, as arrays (1, 1), of what :meth:`StepBounds.difference`
+        takes, others NaN: PᴴP is a polynomial in ω with Hermitian coefficients.
         """
-        d = self._about(kappa)
-        products = np.swapaxes(d, -1, -2)[:, None] @ d                            # dᵀ_m d_k
-        orders = np.tensordot(_ORDERS, products, 2)
-        orders = 0.5 * (orders + np.swapaxes(orders, -1, -2).conj())
+        d = self._about(kappa)[:, _DIFFERENT]
+        products = d.swapaxes(-1, -2)[:, None] @ d                                # dᵀ_m d_k
+        even, odd = (signs.dot(products.reshape(_POWERS**2, -1)).reshape(-1, *d.shape[1:])
+                     for signs in (_EVEN, _ODD))
         # a polynomial in ω² lies among Bernstein's coefficients
-        turned = _BERNSTEIN * omega ** (2 * np.arange(_POWERS))
-        even = np.linalg.eigvalsh(np.tensordot(turned, orders[::2], 1))[..., -1].max(axis=0)
-        odd = np.maximum(np.linalg.eigvalsh(orders[1::2])[..., -1], 0.0)            # (3, 18)
-        squared = even + np.abs(omega) ** np.arange(1, 2 * _POWERS - 1, 2) @ odd
-        return StepBounds(*np.sqrt(np.maximum(squared, 0.0))[:, None, None])
+        turned = (_BERNSTEIN * omega ** (2 * np.arange(_POWERS))).dot(
+            even.reshape(_POWERS, -1)).reshape(even.shape)
+        turned, odd = turned + turned.swapaxes(-1, -2), odd - odd.swapaxes(-1, -2)
+        # i times a skew matrix K has the eigenvalues ±σ, σ² those of KᵀK
+        largest = np.linalg.eigvalsh(
+            np.concatenate([0.5 * turned, 0.25 * odd.swapaxes(-1, -2) @ odd]))[..., -1]
+        squared = largest[:_POWERS].max(axis=0) + np.abs(omega) ** np.arange(
+            1, 2 * _POWERS - 1, 2) @ np.sqrt(np.maximum(largest[_POWERS:], 0.0))
+        found = np.full((len(StepBounds._fields), 1, 1), np.nan)
+        found[_DIFFERENT, 0, 0] = np.sqrt(np.maximum(squared, 0.0))
+        return StepBounds(*found)
+
+
+_DIFFERENT = [StepBounds._fields.index(name) for name in (
+    'T', 'C_y', 'C_a', 'C_b', 'A', 'A_y', 'B', 'B_y', 'B_a')]
 
 
 def step_comparison(M: Array, dt: float) -> StepComparison:
