@@ -70,7 +70,7 @@ class CouplingGraph:
                     f'gain of edge {edge} must have a positive definite symmetric part; '
                     f'its smallest eigenvalue is {smallest:.4g}')
 
-    @property
+    @cached_property
     def weights(self) -> Array | None:
         """k_ij of each edge, ndarray (E,) [1/s]; None where not every K_ij is k_ij I."""
         k = self.gains[:, 0, 0]
@@ -119,12 +119,23 @@ class CouplingGraph:
             L[i, j] -= strongest
         return L
 
+    @cached_property
+    def strongest(self) -> float:
+        """Largest entry of :attr:`comparison` [1/s]."""
+        return float(np.abs(self.comparison).max())
+
+    @cached_property
+    def least_pull(self) -> float:
+        """Smallest sum of a row of :attr:`comparison` [1/s]: 0 where couplings only average."""
+        return float(self.comparison.sum(axis=1).min())
+
     def _block_matrix(self, gains: Iterable[Array], seen_from: Callable[[int, int], Array]
                       ) -> Array:
         matrix = np.zeros((2 * self.size, 2 * self.size))
+        blocks = matrix.reshape(self.size, 2, self.size, 2).swapaxes(1, 2)
         for (i, j), gain in zip(self.edges, gains, strict=True):
-            matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] -= gain
-            matrix[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] += gain @ seen_from(i, j)
+            blocks[i, i] -= gain
+            blocks[i, j] += gain @ seen_from(i, j)
         return matrix
 
 

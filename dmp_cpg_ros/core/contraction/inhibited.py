@@ -87,14 +87,14 @@ def inhibited_contraction(system: CanonicalSystem, capture: CaptureSet) -> Inhib
     growths = growth(system.rho, system.radius)
     rate = inhibition_rate(system.graph, capture.gains)
     whole = float(growths.max())
-    if rate > whole:
-        reach = GLOBAL
-    else:
+    everywhere = rate - whole
+    if not everywhere > 0.0 and growths.min() < whole:
         # Unequal oscillators may contract together where the largest growth does not.
         M = comparison_laplacian(system.graph) + np.diag(capture.gains)
         everywhere = slowest_rate(M - np.diag(growths))
-        if everywhere > 0.0:
-            whole, reach = rate - everywhere, GLOBAL
-        else:
-            reach = REGIONAL if capture.holds and capture.rate > 0.0 else NONE
+        whole = rate - everywhere if everywhere > 0.0 else whole
+    if everywhere > 0.0:
+        reach = GLOBAL
+    else:
+        reach = REGIONAL if capture.holds and capture.rate > 0.0 else NONE
     return InhibitedContraction(rate, whole, rate - capture.rate, reach)

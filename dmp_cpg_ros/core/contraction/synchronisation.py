@@ -243,9 +243,14 @@ def slowest_rate(M: Array) -> float:
     float
         [1/s]
     """
-    if np.array_equal(M, M.T):
+    if _same(M, M.T):
         return float(np.linalg.eigvalsh(M)[0])
     return float(np.linalg.eigvals(M).real.min())
+
+
+def _same(M: Array, other: Array) -> bool:
+    """Whether all entries are the same numbers, but perhaps not where a zero is negative."""
+    return M.tobytes() == other.tobytes()
 
 
 def grounded_connectivity(graph: CouplingGraph, gains: Array) -> float:
@@ -263,10 +268,16 @@ def grounded_connectivity(graph: CouplingGraph, gains: Array) -> float:
     float
         The better of λ_min(L_K + diag α) in the 2-norm and the weighted max-norm [1/s].
     """
-    L = graph.block_laplacian()
-    symmetric = 0.5 * (L + L.T) + np.diag(np.repeat(gains, 2))
-    return max(float(np.linalg.eigvalsh(symmetric)[0]),
-               slowest_rate(comparison_laplacian(graph) + np.diag(gains)))
+    M = graph.comparison + np.diag(gains)
+    slowest = slowest_rate(M)
+    if graph.weights is None:
+        L = graph.block_laplacian()
+        symmetric = 0.5 * (L + L.T) + np.diag(np.repeat(gains, 2))
+    elif _same(M, M.T):
+        return slowest
+    else:
+        symmetric = 0.5 * (M + M.T)  # the same, for K_ij = k_ij I, in both directions of a state
+    return max(float(np.linalg.eigvalsh(symmetric)[0]), slowest)
 
 
 def left_null_weights(laplacian: Array) -> Array | None:

@@ -24,7 +24,6 @@ from dmp_cpg_ros.core.contraction.capture import (
     outward_growth_within,
     target_radius,
 )
-from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import exponential
 from dmp_cpg_ros.core.maths.records import replace_unchecked
@@ -34,6 +33,7 @@ MOST_PERMUTED = 5
 
 SPARE = 1e-3  # share of r0 that is left where they relieve each other
 _DOUBLINGS = 14  # of the number of pieces
+_AT_ONCE = 6  # before the first are looked at
 
 
 def shared_capture(system: CanonicalSystem, omega: float | Array, capture: CaptureSet,
@@ -62,7 +62,7 @@ def shared_capture(system: CanonicalSystem, omega: float | Array, capture: Captu
     if found is None or found.spare < 1.0 + SPARE or (
             found.kept(capture.tolerance, region_radius) < 0.0):
         return capture
-    return replace_unchecked(capture, needed_gain=found.needed)
+    return replace_unchecked(capture, needed_gain=found.needed(region_radius))
 
 
 def growth_in(system: CanonicalSystem, omega: float | Array, capture: CaptureSet) -> Array:
@@ -87,8 +87,8 @@ class Relieved(NamedTuple):
         r0 over the largest of those of inhibited nodes.
     held : ndarray (N,) of bool
         Which nodes are inhibited.
-    needed : ndarray (N,)
-        Gains that they need [1/s]; NaN for the others.
+    gains : ndarray (N,)
+        α [1/s].
     """
 
     M: Array
@@ -96,7 +96,11 @@ class Relieved(NamedTuple):
     borne: Array
     spare: float
     held: NDArray[np.bool_]
-    needed: Array
+    gains: Array
+
+    def needed(self, region_radius: float) -> Array:
+        """Gains that inhibited nodes need (N,) [1/s]; NaN for the others."""
+        return np.where(self.held, self.gains * self.borne / region_radius, np.nan)
 
     def kept(self, tolerance: float, region_radius: float) -> float:
         """How far nodes that enter C in their places stay inside, as a share of r0 at the tightest
@@ -109,20 +113,22 @@ class Relieved(NamedTuple):
         h = beside / float(M.diagonal().max())
         implicit = np.linalg.inv(np.eye(N) + h * M)
         both = np.concatenate([implicit, np.eye(N) - h * M])
-        new = known = (np.where(held, region_radius, region_radius + tolerance)
-                       - self.borne)[:, None]
+        known = (np.where(held, region_radius, region_radius + tolerance) - self.borne)[:, None]
         end = (min(self.spare, 1.05) - 1.0) * self.borne[:, None]
         carry, room, highest = exponential(-h * M), region_radius - self.borne[held, None], -np.inf
-        for _ in range(_DOUBLINGS):
+        for _ in range(_AT_ONCE):
+            known, carry = np.concatenate([known, carry.dot(known)], axis=1), carry.dot(carry)
+        new = known
+        for _ in range(_AT_ONCE, _DOUBLINGS):
             below = np.flatnonzero((new <= end).all(axis=0))
-            late, early = (both @ new[:, :below[0] if len(below) else None]).reshape(2, N, -1)
+            late, early = both.dot(new[:, :below[0]] if len(below) else new).reshape(2, N, -1)
             ahead = np.maximum(late, early)
             line = ahead + beside * (ahead - late).max(axis=0, initial=0.0)
             highest = max(highest, float((line[held] - room).max(initial=-np.inf)))
             if len(below) > 0:
                 return -highest / region_radius
-            new = carry @ known
-            known, carry = np.concatenate([known, new], axis=1), carry @ carry
+            new = carry.dot(known)
+            known, carry = np.concatenate([known, new], axis=1), carry.dot(carry)
         return -np.inf
 
 
@@ -131,19 +137,21 @@ def relieved(system: CanonicalSystem, gains: Array, growth: Array, region_radius
     """What nodes that grow by at most :func:`growth_in` (N,) [1/s] bear together under gains (N,)
     [1/s]; None where nothing is known of it.
     """
-    L, held = comparison_laplacian(system.graph), gains > 0.0
-    M, most = L + np.diag(gains), float(np.abs(L).max() + gains.max())
-    if L.sum(axis=1).min() < -1e-9 * most:
+    graph, M = system.graph, system.graph.comparison.copy()
+    M.ravel()[::len(M) + 1] += gains
+    most = graph.strongest + max(gains.tolist())
+    if graph.least_pull < -1e-9 * most:
         return None
     g = 1e-9 * most * region_radius + growth
     try:
-        borne = np.asarray(np.linalg.solve(M, g), dtype=float)
+        borne = np.linalg.solve(M, g)
     except np.linalg.LinAlgError:
         return None
-    if not borne.min() > 0.0:  # so that M is no M-matrix (Berman & Plemmons 1994, 6.2.3)
+    bears, held = borne.tolist(), gains > 0.0
+    if not min(bears) > 0.0:  # so that M is no M-matrix (Berman & Plemmons 1994, 6.2.3)
         return None
-    return Relieved(M, g, borne, float((region_radius / borne[held]).min()), held,
-                    np.where(held, gains * borne / region_radius, np.nan))
+    most = max(each for each, acts in zip(bears, held.tolist(), strict=True) if acts)
+    return Relieved(M, g, borne, region_radius / most, held, gains)
 
 
 @lru_cache(MOST_KEPT)

@@ -196,7 +196,7 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
         capture = replace_unchecked(box, gains=_votes(system, voters, alpha))
         if beyond >= 0.0 and found is not None and not capture.holds:
             beyond = found.kept(box.tolerance, region_radius)
-            capture = replace_unchecked(capture, needed_gain=found.needed)
+            capture = replace_unchecked(capture, needed_gain=found.needed(region_radius))
         if beyond < 0.0 or inhibited_contraction(system, capture).reach == GLOBAL:
             return beyond
         rate = capture_set(system, omega, capture.gains, region_radius).rate
