@@ -77,14 +77,14 @@ def settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed:
         return math.inf
     swings = _filtered(math.exp(-s.parameters.leg.activity_rate * of.cell))
     n, m = of.start.shape
-    carried, fed, apart = _carried(of.carry), None, float(of.inner.min()) > 1e-12
+    carried, apart = _carried(of.carry), float(of.inner.min()) > 1e-12
+    fed = _fed(of, carried) if speed > 0.0 else carried
     blocks, swinging = np.empty((_BLOCKS, (_BLOCK + 1) * n, m)), np.empty((_BLOCKS, _BLOCK + 1, N))
     bounds, followed = of.start, np.ones((_BLOCK + 1, N))
     for begin in range(0, cells, _BLOCKS * _BLOCK):
         speeds, speed = _slowing(speed, fade, a_b * of.cell)
         driven = speeds[0] > 0.0
         if driven:
-            fed = _fed(of, carried) if fed is None else fed
             drives = np.stack(drive(speeds), axis=1).reshape(_BLOCKS, fed.shape[1], -1)
         for k, block in enumerate(blocks):
             carried.dot(bounds, out=block)
@@ -209,8 +209,7 @@ def _falling_in_steps(s: Setting, capture: CaptureSet, step: SteppedNetwork) -> 
 
 
 def _carried(carry: Array) -> Array:
-    """Matrix that makes of bounds those at the ends of all cells of a block, the first included.
-    """
+    """Matrix that makes of bounds those at the ends of all cells of a block, and the first."""
     n = len(carry)
     powers = np.empty(((_BLOCK + 1) * n, n))
     powers[:n], known = np.eye(n), n

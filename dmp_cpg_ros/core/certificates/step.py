@@ -217,8 +217,8 @@ def _stages(bound: StepBounds, pull: Array, disc: float, rho: float, r: float
     start = largest_radial(rho, r, disc)
     a = float((bound.A.sum(axis=1) * disc + bound.A_y.dot(pull + start)).max())
     middle = largest_radial(rho, r, a)
-    return a, float((bound.B.sum(axis=1) * disc + bound.B_c.dot(pull) + bound.B_y.sum(axis=1) * start
-                     + bound.B_a.sum(axis=1) * middle).max())
+    return a, float((bound.B.sum(axis=1) * disc + bound.B_c.dot(pull)
+                     + bound.B_y.sum(axis=1) * start + bound.B_a.sum(axis=1) * middle).max())
 
 
 @dataclass(frozen=True)

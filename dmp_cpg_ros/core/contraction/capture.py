@@ -20,6 +20,7 @@ nodes away from the origin, where oscillators diverge, and gives contraction on 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -191,26 +192,32 @@ def outward_growth(system: CanonicalSystem, omega: Array, D: float, u: Array) ->
 
 def outward_growth_within(system: CanonicalSystem, omega: Array, D: float, u: Array) -> Array:
     """Largest g_i(v) over v ≤ u_i, which rises with u as the iteration for the box needs [1/s]."""
-    return np.abs(omega) * D + _radial_growth_within(system.rho, system.radius, D, u)
+    return np.abs(omega) * D + _radial_growth_within(system.rho, system.radius, D)(u)
 
 
-def _radial_growth_within(rho: Array, r: Array, D: float, u: Array) -> Array:
-    """Radial part of it, ndarray (N,) [1/s].
+def _radial_growth_within(rho: Array, r: Array, D: float) -> Callable[[Array], Array]:
+    """Radial part of it, ndarray (N,) → (N,) [1/s].
 
     For r = |x_d| it is g_i's itself up to where c reaches −|x_d|, and from there up to where
     |x| = r/√3 with x along x_d. Else it has its other maxima there, or where c leaves or reaches
     ±|x_d|.
     """
-    reach = r / np.sqrt(3.0)
-    if (r == D).all():
+    reach, eighth, bend = r / np.sqrt(3.0), 0.125 * rho, 4.0 / 3.0 * D
+
+    def alike(u: Array) -> Array:
         v = np.minimum(u, reach + D)
-        return np.asarray(np.where(
-            v <= 4.0 / 3.0 * D, 0.125 * rho * (v * v * v), rho * (2.0 * v * D - v * v) * (v - D)))
-    root = np.sqrt(np.maximum(4.0 * D**2 + 3.0 * (r**2 - D**2), 0.0))
-    places = np.stack([u, 0.0 * r, reach - D, reach + D, (root - 2.0 * D) / 3.0,
-                       (root + 2.0 * D) / 3.0, (2.0 * D - root) / 3.0])
-    return np.maximum(
-        _radial_growth(rho, r, D, np.clip(places, 0.0, u)).max(axis=0), 0.0)
+        inner = np.asarray(eighth * (v * v * v))
+        return inner if v.max() <= bend else np.where(
+            v <= bend, inner, rho * (2.0 * v * D - v * v) * (v - D))
+
+    def unlike(u: Array) -> Array:
+        root = np.sqrt(np.maximum(4.0 * D**2 + 3.0 * (r**2 - D**2), 0.0))
+        places = np.stack([u, 0.0 * r, reach - D, reach + D, (root - 2.0 * D) / 3.0,
+                           (root + 2.0 * D) / 3.0, (2.0 * D - root) / 3.0])
+        growth = _radial_growth(rho, r, D, np.clip(places, 0.0, u))
+        return np.maximum(growth.max(axis=0), 0.0)
+
+    return alike if (r == D).all() else unlike
 
 
 def _radial_growth(rho: Array, r: Array, D: float, u: Array) -> Array:
@@ -244,21 +251,21 @@ def _distances(system: CanonicalSystem, L: Array, omega: Array, inhibited: Mask,
     where the box shrinks. A node that the inhibited ones do not reach, or
     not firmly, may be anywhere in the invariant disc.
     """
-    u, free, known = np.where(inhibited, region_radius, largest), ~inhibited, False
+    u, free, inverse = np.where(inhibited, region_radius, largest), ~inhibited, None
     for _ in range(12):
-        if not known:
+        if inverse is None:
             inverse = _grounded_inverse(L, free) if free.any() else None
             if inverse is None:
                 u[free] = largest
                 break
-            known, rho, r, far = True, system.rho[free], system.radius[free], u[free]
+            far = u[free]
+            radial = _radial_growth_within(system.rho[free], system.radius[free], D)
             turning, pulled = omega[free] * D, L[free][:, ~free].dot(u[~free])
-        solved = inverse.dot(turning + _radial_growth_within(rho, r, D, far) - pulled)
+        solved = inverse.dot(turning + radial(far) - pulled)
         beyond = solved >= largest
         if beyond.any():
             u[free] = np.where(beyond, largest, far)        # fixed at the edge of the disc
-            free[free] = ~beyond
-            known = False
+            free[free], inverse = ~beyond, None
             continue
         nearer = np.minimum(far, solved)
         if np.abs(nearer - far).max() < 1e-12:
@@ -280,7 +287,7 @@ def _grounded_inverse(L: Array, free: Mask) -> Array | None:
         return None
     grounded = L[free][:, free]
     firm = slowest_rate(grounded) > 1e-9 * float(np.abs(grounded).max())
-    return np.linalg.inv(grounded) if firm else None
+    return np.asarray(np.linalg.inv(grounded)) if firm else None
 
 
 def _smallest_radii(system: CanonicalSystem, M: Array, omega: Array, u: Array, D: float,

@@ -99,8 +99,12 @@ def equilibrium_up_to(system: CanonicalSystem, omega: float | Array, gains: Arra
                       ) -> tuple[InhibitedEquilibrium | None, float]:
     """:func:`inhibited_equilibrium`, and the share of ω up to which it exists; 0 where there is
     none to begin with.
+
+    It is looked for at once, near where it would be if couplings were springs. Where none is there
+    that is stable, it is followed from where it is known or from the targets.
     """
-    x = system.target if known is None else known
+    x: Array | None = system.target if known is None else known
+    assert x is not None
     near = _ahead(system, x, (1.0 - share) * omega, gains)
     whole = None if near is None else _newton(system, near, omega, gains)
     if whole is not None:

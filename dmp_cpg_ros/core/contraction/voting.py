@@ -32,8 +32,7 @@ MOST_PERMUTED = 5
 """Nodes of which all permutations are tried in search of symmetries."""
 
 SPARE = 1e-3  # share of r0 that is left where they relieve each other
-_DOUBLINGS = 14  # of the number of pieces
-_AT_ONCE = 6  # before the first are looked at
+_DOUBLINGS = 13  # of the number of pieces
 
 
 def shared_capture(system: CanonicalSystem, omega: float | Array, capture: CaptureSet,
@@ -104,32 +103,40 @@ class Relieved(NamedTuple):
 
     def kept(self, tolerance: float, region_radius: float) -> float:
         """How far nodes that enter C in their places stay inside, as a share of r0 at the tightest
-        piece of their way; negative where they may not, −∞ where it does not end.
+        piece of their way; negative where they may not, −∞ where it does not end, as without
+        anything to spare.
 
         At times that are evenly spaced w with ẇ = g − M w is known. Between two of them it lies
-        below a straight line with ẇ ≥ g − M w at both ends.
+        below a straight line with ẇ ≥ g − M w at both ends. Below a share of what they bear more
+        than M⁻¹g it stays.
         """
         M, held, N, beside = self.M, self.held, len(self.g), 0.1
         h = beside / float(M.diagonal().max())
+        known = np.where(held, region_radius, region_radius + tolerance) - self.borne
+        end = (min(self.spare, 1.05) - 1.0) * self.borne
+        if not self.spare >= 1.0:
+            return -np.inf
+        if (known <= end).all():
+            return np.inf
+        carries = [exponential(-h * M)]
+        for _ in range(_DOUBLINGS):
+            carries.append(carries[-1].dot(carries[-1]))
+        last, pieces = known, 1
+        for k in reversed(range(_DOUBLINGS)):
+            later = carries[k].dot(last)
+            if not (later <= end).all():
+                last, pieces = later, pieces + 2**k
+        if pieces == 2**_DOUBLINGS:
+            return -np.inf
+        ws = known[:, None]
+        for carry in carries[:(pieces - 1).bit_length()]:
+            ws = np.concatenate([ws, carry.dot(ws)], axis=1)
         implicit = np.linalg.inv(np.eye(N) + h * M)
-        both = np.concatenate([implicit, np.eye(N) - h * M])
-        known = (np.where(held, region_radius, region_radius + tolerance) - self.borne)[:, None]
-        end = (min(self.spare, 1.05) - 1.0) * self.borne[:, None]
-        carry, room, highest = exponential(-h * M), region_radius - self.borne[held, None], -np.inf
-        for _ in range(_AT_ONCE):
-            known, carry = np.concatenate([known, carry.dot(known)], axis=1), carry.dot(carry)
-        new = known
-        for _ in range(_AT_ONCE, _DOUBLINGS):
-            below = np.flatnonzero((new <= end).all(axis=0))
-            late, early = both.dot(new[:, :below[0]] if len(below) else new).reshape(2, N, -1)
-            ahead = np.maximum(late, early)
-            line = ahead + beside * (ahead - late).max(axis=0, initial=0.0)
-            highest = max(highest, float((line[held] - room).max(initial=-np.inf)))
-            if len(below) > 0:
-                return -highest / region_radius
-            new = carry.dot(known)
-            known, carry = np.concatenate([known, new], axis=1), carry.dot(carry)
-        return -np.inf
+        late, early = np.concatenate([implicit, np.eye(N) - h * M]).dot(
+            ws[:, :pieces]).reshape(2, N, -1)
+        ahead = np.maximum(late, early)
+        line = ahead + beside * (ahead - late).max(axis=0)
+        return float((region_radius - self.borne[held, None] - line[held]).min()) / region_radius
 
 
 def relieved(system: CanonicalSystem, gains: Array, growth: Array, region_radius: float

@@ -95,7 +95,8 @@ class StepBounds(NamedTuple):
         """
         half = self.A + self.A_y * start
         last = self.B + self.B_y * start + (self.B_a * middle).dot(half)
-        return self.T + self.C_y * start + (self.C_a * middle).dot(half) + (self.C_b * end).dot(last)
+        return (self.T + self.C_y * start + (self.C_a * middle).dot(half)
+                + (self.C_b * end).dot(last))
 
     def forced(self, middle: Array, end: Array) -> Array:
         """Matrix Y with Y η a bound of what parts of N up to η, others at each stage, do to y⁺."""

@@ -194,7 +194,7 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
         found = together(alpha)
         beyond = spare(alpha, found)
         capture = replace_unchecked(box, gains=_votes(system, voters, alpha))
-        if beyond >= 0.0 and found is not None and not capture.holds:
+        if beyond >= 0.0 and found is not None and found.spare >= 1.0 and not capture.holds:
             beyond = found.kept(box.tolerance, region_radius)
             capture = replace_unchecked(capture, needed_gain=found.needed(region_radius))
         if beyond < 0.0 or inhibited_contraction(system, capture).reach == GLOBAL:
