@@ -12,6 +12,7 @@ import dataclasses
 import math
 import sys
 from collections.abc import Collection, Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple, TypeVar
 
 from dmp_cpg_ros.core.errors import ParameterError
@@ -57,8 +58,11 @@ class Parameters:
 
     def __post_init__(self) -> None:
         """Validate; raises ParameterError that names the field, the value and what is valid."""
-        for field in dataclasses.fields(self):
-            object.__setattr__(self, field.name, _checked(field, getattr(self, field.name)))
+        held = self.__dict__
+        for field, kind, low, high in _kinds(type(self)):
+            value = held[field.name]
+            if not (type(value) is kind and low <= value <= high):  # as it mostly is
+                object.__setattr__(self, field.name, _checked(field, value))
 
     @classmethod
     def from_mapping(cls: type[P], values: Mapping[str, Any], where: str = 'parameters') -> P:
@@ -144,6 +148,18 @@ def typed(value: Any) -> str:
 def _range(field: dataclasses.Field[Any]) -> tuple[float, float]:
     low, high = field.metadata['minimum'], field.metadata['maximum']
     return -math.inf if low is None else low, math.inf if high is None else high
+
+
+@lru_cache(maxsize=256)
+def _kinds(cls: type[Any]) -> list[tuple[dataclasses.Field[Any], type | None, Any, Any]]:
+    """Fields, with the type and the range of those whose values need no other look."""
+    kinds = list[tuple[dataclasses.Field[Any], type | None, Any, Any]]()
+    for field in dataclasses.fields(cls):
+        kind, (low, high) = type(field.default), _range(field)
+        kinds.append((field, kind, False, True) if kind is bool else (
+            field, kind, max(low, -sys.float_info.max), min(high, sys.float_info.max))
+            if kind in (int, float) else (field, None, 0.0, 0.0))
+    return kinds
 
 
 def _checked(field: dataclasses.Field[Any], value: Any) -> Any:

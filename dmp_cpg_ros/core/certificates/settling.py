@@ -24,7 +24,7 @@ from dmp_cpg_ros.core.contraction.hopf_bounds import growth, largest_radial
 from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian
 from dmp_cpg_ros.core.inhibition import supervisor
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.exponential import phi_functions
+from dmp_cpg_ros.core.maths.exponential import exponential
 from dmp_cpg_ros.core.reference.operating_range import REST_SPEED
 
 STEP = 0.01
@@ -181,12 +181,12 @@ def _falling(s: Setting, capture: CaptureSet, turning: float, away: float) -> _F
     system, u = s.network.system, capture.distance
     K = comparison_laplacian(system.graph) + np.diag(capture.gains) - np.diag(
         growth(system.rho, system.radius, capture.smallest_radius))
-    carry, feed = phi_functions(-K * STEP, 1)
+    carry = exponential(-K * STEP)
     shape = np.linalg.solve(K, np.ones(len(K)))              # K shape = 1: bounds above it fall
     fastest = _fastest(s, capture.gains, u, s.network.parameters.radius)
     start = np.outer(shape, [max(float((fastest / shape).max()), turning),
                              max(float((2.0 * u / shape).max()), away)])
-    return _Falling(STEP, start, carry, STEP * feed.sum(axis=1, keepdims=True),
+    return _Falling(STEP, start, carry, (shape - carry.dot(shape))[:, None],
                     capture.smallest_radius)
 
 

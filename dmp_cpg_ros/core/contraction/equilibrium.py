@@ -142,11 +142,11 @@ def _ahead(system: CanonicalSystem, x: Array, omega: float | Array, gains: Array
 def described(system: CanonicalSystem, x: Array, omega: float | Array, gains: Array
               ) -> InhibitedEquilibrium:
     """Everything about an equilibrium x (N, 2) at ω [rad/s] under gains (N,) [1/s]."""
-    rates = np.linalg.eigvals(system.jacobian(x, omega, gains)).real
+    rates = np.linalg.eigvals(system.jacobian(x, omega, gains)).real.tolist()
+    left = _lengths(system.field(x, omega, gains))
     return InhibitedEquilibrium(
         x, wrapped(phase(x) - system.graph.phases), np.hypot(x[:, 0], x[:, 1]),
-        np.linalg.norm(x - system.target, axis=1),
-        float(np.linalg.norm(system.field(x, omega, gains), axis=1).max()), -float(rates.max()))
+        _lengths(x - system.target), max(left.tolist()), -max(rates))
 
 
 def _newton(system: CanonicalSystem, x: Array, omega: float | Array, gains: Array,
@@ -165,6 +165,11 @@ def _newton(system: CanonicalSystem, x: Array, omega: float | Array, gains: Arra
         if not _largest(x - start) <= reach:
             return None
     return None
+
+
+def _lengths(vectors: Array) -> Array:
+    squares = vectors * vectors
+    return np.asarray(np.sqrt(squares[:, 0] + squares[:, 1]))
 
 
 def _largest(values: Array) -> float:

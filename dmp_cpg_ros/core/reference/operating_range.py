@@ -4,14 +4,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
+from math import sqrt
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.gait.body_scale import BodyScale
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 
@@ -73,10 +72,11 @@ def operating_range(network: GaitNetwork, inhibition: InhibitionParameters,
     fastest, armed = _fastest(network.scale, reference), armed_speed(
         network.scale, inhibition, reference)
     speeds, omegas = _cadences(network, armed)
-    slopes = np.abs(np.diff(omegas) / np.maximum(np.diff(speeds), 1e-12))
+    slopes = (abs((omegas[k + 1] - omegas[k]) / max(speeds[k + 1] - speeds[k], 1e-12))
+              for k in range(len(speeds) - 1))
     return OperatingRange(fastest, armed, _extremes(_cadences(network, max(fastest, armed))[1]),
                           _extremes(omegas), network.gait.omega(0.0, network.scale),
-                          float(slopes.max(initial=0.0)))
+                          max(slopes, default=0.0))
 
 
 def armed_speed(scale: BodyScale, inhibition: InhibitionParameters,
@@ -97,14 +97,13 @@ def _fastest(scale: BodyScale, reference: ReferenceParameters) -> float:
         reference.max_speed, reference.max_lateral_speed, reference.max_turn_rate)
 
 
-def _cadences(network: GaitNetwork, largest: float) -> tuple[Array, Array]:
+def _cadences(network: GaitNetwork, largest: float) -> tuple[list[float], list[float]]:
     """Speeds from 0 to the largest between which ω is linear, and ω there."""
-    knots = np.concatenate([end.speed for end in network.gait.ends]) * float(
-        np.sqrt(GRAVITY * network.scale.leg_length))
-    between = knots[(knots > 0.0) & (knots < largest)]
-    speeds = np.unique(np.concatenate([[0.0], between, [largest]]))
-    return speeds, np.array([network.gait.omega(float(u), network.scale) for u in speeds])
+    unit = sqrt(GRAVITY * network.scale.leg_length)
+    knots = (unit * knot for end in network.gait.ends for knot in end.speed.tolist())
+    speeds = sorted({0.0, largest, *(knot for knot in knots if 0.0 < knot < largest)})
+    return speeds, [network.gait.omega(u, network.scale) for u in speeds]
 
 
-def _extremes(values: Array) -> tuple[float, float]:
-    return float(values.min()), float(values.max())
+def _extremes(values: Sequence[float]) -> tuple[float, float]:
+    return min(values), max(values)
