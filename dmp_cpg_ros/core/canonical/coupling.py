@@ -100,10 +100,10 @@ class CouplingGraph:
 
     @cached_property
     def _locked(self) -> Array:
-        turns = [phase_rotation(float(phi)) for phi in self.phases]
+        turns, unit = [phase_rotation(float(phi)) for phi in self.phases], np.eye(2)
         turned = [turns[i].T @ gain @ turns[i]
                   for (i, _), gain in zip(self.edges, self.gains, strict=True)]
-        return -self._block_matrix(turned, lambda i, j: np.eye(2))
+        return -self._block_matrix(turned, lambda i, j: unit)
 
     @cached_property
     def comparison(self) -> Array:

@@ -32,6 +32,7 @@ from dmp_cpg_ros.core.gait.running import CADENCE_RATE
 from dmp_cpg_ros.core.gait.transition import SETTLING_RATE, STANDING, GaitTransition
 from dmp_cpg_ros.core.inhibition.entry import eligible_legs, farthest_way
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
@@ -139,7 +140,7 @@ def votes_among(p: SuiteParameters, networks: Sequence[GaitNetwork], tick_s: flo
         for row in vote_inequalities(Setting.of(network, p, tick_s, span, 2.0 * math.pi)):
             known = worst.get(row.name)
             if known is None or not row.margin > known.margin:
-                worst[row.name] = replace(
+                worst[row.name] = replace_unchecked(
                     row, sentence=f'{row.sentence}, in {network.gait.name}')
         if until_lost and lost(worst.values()):
             break

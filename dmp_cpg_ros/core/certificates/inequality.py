@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, GRADES, PROVED, SAMPLED, weakest
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 
 ROUNDING = 1e-9
 """Share of the larger side by which an inequality must hold, far above all rounding errors."""
@@ -135,8 +136,8 @@ def discharged(rows: Iterable[Inequality], *, alike: bool) -> list[Inequality]:
 
     def now(row: Inequality) -> Inequality:
         if row.name in STEP_ROWS or row.name == 'time_step':
-            return replace(row, required=proved is (row.name in STEP_ROWS))
-        return replace(row, grade=PROVED if proved else CONTINUOUS) if (
+            return replace_unchecked(row, required=proved is (row.name in STEP_ROWS))
+        return replace_unchecked(row, grade=PROVED if proved else CONTINUOUS) if (
             row.name in _CARRIED_OVER) else row
 
     return [now(row) for row in rows]

@@ -115,7 +115,7 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
         in their places.
     """
     size = system.graph.size
-    omega = np.broadcast_to(np.abs(omega), (size,)).astype(float)
+    omega = np.full(size, np.abs(omega), dtype=float)
     gains = np.asarray(gains, dtype=float)
     if not (np.isfinite(region_radius) and region_radius > 0.0):
         raise ParameterError(f'region_radius = {region_radius!r} must be positive and finite')
@@ -207,7 +207,7 @@ def _radial_growth_within(rho: Array, r: Array, D: float) -> Callable[[Array], A
     def alike(u: Array) -> Array:
         v = np.minimum(u, reach + D)
         inner = np.asarray(eighth * (v * v * v))
-        return inner if v.max() <= bend else np.where(
+        return inner if max(v.tolist()) <= bend else np.where(
             v <= bend, inner, rho * (2.0 * v * D - v * v) * (v - D))
 
     def unlike(u: Array) -> Array:
@@ -231,6 +231,12 @@ def _radial_growth(rho: Array, r: Array, D: float, u: Array) -> Array:
 
 def target_radius(system: CanonicalSystem, inhibited: Mask) -> float:
     """D = |x_d|; the inhibited nodes must be pulled to one state in locked coordinates."""
+    return _target_radius(system, inhibited.tobytes())
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _target_radius(system: CanonicalSystem, nodes: bytes) -> float:
+    inhibited = np.frombuffer(nodes, dtype=bool)
     if not inhibited.any():
         raise ParameterError('no node is inhibited: at least one gain must be positive')
     places = np.array([phase_rotation(float(phi)).T @ target for phi, target in zip(
@@ -262,13 +268,13 @@ def _distances(system: CanonicalSystem, L: Array, omega: Array, inhibited: Mask,
             radial = _radial_growth_within(system.rho[free], system.radius[free], D)
             turning, pulled = omega[free] * D, L[free][:, ~free].dot(u[~free])
         solved = inverse.dot(turning + radial(far) - pulled)
-        beyond = solved >= largest
-        if beyond.any():
+        if max(solved.tolist()) >= largest:
+            beyond = solved >= largest
             u[free] = np.where(beyond, largest, far)        # fixed at the edge of the disc
             free[free], inverse = ~beyond, None
             continue
         nearer = np.minimum(far, solved)
-        if np.abs(nearer - far).max() < 1e-12:
+        if max((far - nearer).tolist()) < 1e-12:
             break
         u[free] = far = nearer
     return u

@@ -121,10 +121,10 @@ class Relieved(NamedTuple):
         carries = [exponential(-h * M)]
         for _ in range(_DOUBLINGS):
             carries.append(carries[-1].dot(carries[-1]))
-        last, pieces = known, 1
+        last, pieces, ends = known, 1, end.tolist()
         for k in reversed(range(_DOUBLINGS)):
             later = carries[k].dot(last)
-            if not (later <= end).all():
+            if any(w > most for w, most in zip(later.tolist(), ends, strict=True)):
                 last, pieces = later, pieces + 2**k
         if pieces == 2**_DOUBLINGS:
             return -np.inf
