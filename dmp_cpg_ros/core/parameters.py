@@ -12,7 +12,6 @@ import dataclasses
 import math
 import sys
 from collections.abc import Collection, Mapping
-from functools import lru_cache
 from typing import Any, NamedTuple, TypeVar
 
 from dmp_cpg_ros.core.errors import ParameterError
@@ -150,16 +149,20 @@ def _range(field: dataclasses.Field[Any]) -> tuple[float, float]:
     return -math.inf if low is None else low, math.inf if high is None else high
 
 
-@lru_cache(maxsize=256)
-def _kinds(cls: type[Any]) -> list[tuple[dataclasses.Field[Any], type | None, Any, Any]]:
-    """Fields, with the type and the range of those whose values need no other look."""
-    kinds = list[tuple[dataclasses.Field[Any], type | None, Any, Any]]()
-    for field in dataclasses.fields(cls):
-        kind, (low, high) = type(field.default), _range(field)
-        kinds.append((field, kind, False, True) if kind is bool else (
-            field, kind, max(low, -sys.float_info.max), min(high, sys.float_info.max))
-            if kind in (int, float) else (field, None, 0.0, 0.0))
-    return kinds
+_Kinds = list[tuple[dataclasses.Field[Any], Any, Any, Any]]
+_KINDS = dict[type, _Kinds]()
+
+
+def _kinds(cls: type) -> _Kinds:
+    """Fields, with the type and the range of those whose values need no other look; kept."""
+    if cls not in _KINDS:
+        kinds = _KINDS[cls] = _Kinds()
+        for field in dataclasses.fields(cls):
+            kind, (low, high) = type(field.default), _range(field)
+            kinds.append((field, kind, False, True) if kind is bool else (
+                field, kind, max(low, -sys.float_info.max), min(high, sys.float_info.max))
+                if kind in (int, float) else (field, None, 0.0, 0.0))
+    return _KINDS[cls]
 
 
 def _checked(field: dataclasses.Field[Any], value: Any) -> Any:

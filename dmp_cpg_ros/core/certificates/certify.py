@@ -116,14 +116,13 @@ def _certificate(s: Setting, required_only: bool, until_lost: bool, until: str,
         return Certificate((*rows, at_rest[-1]), contraction.reach, s.span.omega[1])
     rates = (found.rate, max(contraction.rate, analysis.capture.rate), 2.0 * p.rho * p.radius**2)
     slowest = min(rate for rate in rates if rate > 0.0)       # rates that there are to keep
-    step = stepped_network(s, analysis) if all(row.holds for row in rows) else None
-    stop = time_to_rest(s, analysis.capture, rest)
-    in_steps = stop if step is None or not step.proved or stop >= LONGEST_STOP else max(
-        stop, time_to_rest(s, analysis.capture, rest, step))
-    if in_steps >= LONGEST_STOP:  # a step that is proved to contract too slowly is of no use
-        step = None
-    else:
-        stop = in_steps
+    step, stop = None, time_to_rest(s, analysis.capture, rest)
+    if stop < LONGEST_STOP and all(row.holds for row in rows):
+        step = stepped_network(s, analysis)
+        in_steps = 0.0 if step is None or not step.proved else time_to_rest(
+            s, analysis.capture, rest, step)
+        # a step that is proved to contract too slowly is of no use
+        step, stop = (step, max(stop, in_steps)) if in_steps < LONGEST_STOP else (None, stop)
     start = time_to_walking(s, found, rest)
     if not required_only:
         rows.append(of_network.capture_anywhere(s, analysis))
