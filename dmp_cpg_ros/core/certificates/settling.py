@@ -70,7 +70,7 @@ def settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed:
         return (span.omega_slope * np.maximum(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r,
                 span.omega_slope * speed * r)
 
-    of = _falling(s, capture, *map(float, drive(np.array(speed)))) if step is None else (
+    of = _falling(s, capture, *map(float, drive(np.float64(speed)))) if step is None else (
         _falling_in_steps(s, capture, step))
     fade, cells = math.exp(-alpha_r * of.cell), int(HORIZON / of.cell)
     if a_b == 0.0 and not speed * fade ** (cells - 1) <= 1.001 * REST_SPEED:
@@ -169,8 +169,8 @@ class _Falling(NamedTuple):
 
 def _fastest(s: Setting, gains: Array, u: Array, disc: float) -> Array:
     """Bound of |ẋ_i| in a box and a disc, ndarray (N,)."""
-    system, r, degree = s.network.system, s.network.parameters.radius, np.diag(
-        comparison_laplacian(s.network.system.graph))
+    system, r = s.network.system, s.network.parameters.radius
+    degree = system.graph.comparison.diagonal()
     return np.asarray(
         s.span.omega_armed[1] * disc + largest_radial(float(system.rho[0]), r, disc)
         + gains * u + degree * (u + u.max()))
@@ -179,8 +179,10 @@ def _fastest(s: Setting, gains: Array, u: Array, disc: float) -> Array:
 def _falling(s: Setting, capture: CaptureSet, turning: float, away: float) -> _Falling:
     """Of the differential equation."""
     system, u = s.network.system, capture.distance
-    K = comparison_laplacian(system.graph) + np.diag(capture.gains) - np.diag(
-        growth(system.rho, system.radius, capture.smallest_radius))
+    K = comparison_laplacian(system.graph)
+    diagonal = K.ravel()[::len(K) + 1]
+    diagonal += capture.gains
+    diagonal -= growth(system.rho, system.radius, capture.smallest_radius)
     carry = exponential(-K * STEP)
     shape = np.linalg.solve(K, np.ones(len(K)))              # K shape = 1: bounds above it fall
     fastest = _fastest(s, capture.gains, u, s.network.parameters.radius)
@@ -222,12 +224,12 @@ def _carried(carry: Array) -> Array:
 
 def _fed(of: _Falling, carried: Array) -> Array:
     """Matrix that makes of what feeds bounds in each cell of a block what it adds to them."""
-    n = len(of.start)
-    each = carried[:-n].dot(of.feed).reshape(_BLOCK, *of.feed.shape)
-    fed = np.zeros((_BLOCK + 1, n, _BLOCK, each.shape[2]))
-    for cell in range(_BLOCK):
-        fed[cell + 1:, :, cell] = each[:_BLOCK - cell]
-    return fed.reshape((_BLOCK + 1) * n, -1)
+    n, width = of.feed.shape
+    since = np.zeros((2 * _BLOCK, n, width))  # by the cells since it was fed, after those to come
+    since[_BLOCK:] = carried[:-n].dot(of.feed).reshape(_BLOCK, n, width)
+    cell = since.strides[0]
+    return np.ndarray((_BLOCK + 1, n, _BLOCK, width), float, since, (_BLOCK - 1) * cell,
+                      (cell, 8 * width, -cell, 8)).reshape((_BLOCK + 1) * n, -1)
 
 
 _CELLS = np.arange(_BLOCK + 1)

@@ -28,10 +28,11 @@ from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, SAMPLED
 from dmp_cpg_ros.core.contraction.voting import different_voters, shared_capture
 from dmp_cpg_ros.core.gait.network import GaitNetwork, at_own_cadence
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.voting.parameters import VotingParameters
-from dmp_cpg_ros.core.voting.thresholds import enough_for_all, too_weak_for_all
+from dmp_cpg_ros.core.voting.thresholds import enough_for_all, too_weak_for_all, votes_of
 from dmp_cpg_ros.core.voting.voting import VoteClamp, vote_clamp
 
 VOTE_ROWS = ('votes_contraction', 'votes_suffice', 'votes_needed', 'votes_time_to_rest')
@@ -101,7 +102,7 @@ def vote_bound(s: Setting, gains: Array) -> float:
 def _under(s: Setting, system: CanonicalSystem, gains: Array
            ) -> tuple[float, inhibited.InhibitedContraction, float]:
     """Gain that capture needs, contraction, and bound on the time to rest under some votes."""
-    s = replace(s, way=2.0 * math.pi)                             # votes wait for fl's phase 0
+    s = replace_unchecked(s, way=2.0 * math.pi)                   # votes wait for fl's phase 0
     omega, r0 = s.span.omega_armed[1], s.parameters.inhibition.region_radius
     capture = shared_capture(system, omega, capture_set(system, omega, gains, r0), r0)
     found = inhibited.inhibited_contraction(system, capture)
@@ -136,8 +137,8 @@ def _rows(asked: _Asked) -> tuple[Inequality, ...]:
     p, voting = s.parameters.inhibition, s.parameters.voting
     clamp, count = vote_clamp(s.network, p, voting, s.span), voting.majority
     system = clamp.window.system
-    legs, acting = np.arange(system.graph.size), max(clamp.gain, 1e-9)
-    needed, found, bounds = zip(*(_under(s, system, np.where(np.isin(legs, voters), acting, 0.0))
+    acting = max(clamp.gain, 1e-9)
+    needed, found, bounds = zip(*(_under(s, system, votes_of(system, voters, acting))
                                   for voters in different_voters(system, count)), strict=True)
     worst = min(found, key=lambda contraction: contraction.rate)
     who = 'any leg alone' if count == 1 else f'any {count} legs'

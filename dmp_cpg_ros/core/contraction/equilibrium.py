@@ -132,9 +132,10 @@ def _ahead(system: CanonicalSystem, x: Array, omega: float | Array, gains: Array
     """About where an equilibrium x (N, 2) goes when ω rises by so much [rad/s]: as far ahead as if
     couplings and inhibition were springs of the phases; None where they do not hold all of them.
     """
-    stiffness = system.graph.comparison + np.diag(gains)
+    stiffness = system.graph.comparison.copy()
+    stiffness.ravel()[::len(gains) + 1] += gains
     try:
-        return turned(x, np.linalg.solve(stiffness, np.broadcast_to(omega, gains.shape)))
+        return turned(x, np.linalg.solve(stiffness, np.full(len(gains), omega)))
     except np.linalg.LinAlgError:
         return None
 

@@ -268,7 +268,8 @@ def grounded_connectivity(graph: CouplingGraph, gains: Array) -> float:
     float
         The better of λ_min(L_K + diag α) in the 2-norm and the weighted max-norm [1/s].
     """
-    M = graph.comparison + np.diag(gains)
+    M = comparison_laplacian(graph)
+    M.ravel()[::len(M) + 1] += gains
     slowest = slowest_rate(M)
     if graph.weights is None:
         L = graph.block_laplacian()

@@ -105,7 +105,7 @@ def rest_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequen
 
     def room(alpha: float) -> float:
         nonlocal rest
-        gains = _votes(system, voters, alpha)
+        gains = votes_of(system, voters, alpha)
         found = None if rest is None else equilibrium_near(system, omega, gains, rest.state)
         if found is None:
             found, share = equilibrium_up_to(system, omega, gains)
@@ -140,7 +140,7 @@ def _at_the_edge(system: CanonicalSystem, omega: float | Array, voters: Sequence
     x, N = rest.state, system.graph.size
     node = max(voters, key=lambda voter: float(rest.distance[voter]))
     for _ in range(_MOST_STEPS):
-        gains = _votes(system, voters, alpha)
+        gains = votes_of(system, voters, alpha)
         off = system.target - x
         field = system.field(x, omega, gains)
         beyond = off[node] @ off[node] - region_radius**2
@@ -181,11 +181,11 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
         Sufficient for a stop [1/s]; infinite when no weight is certified.
     """
     box = capture_set(
-        system, omega, _votes(system, voters, 1.0), region_radius, contracts=False)
+        system, omega, votes_of(system, voters, 1.0), region_radius, contracts=False)
     needed, growth = float(np.nanmax(box.needed_gain)), growth_in(system, omega, box)
 
     def together(alpha: float) -> Relieved | None:
-        return relieved(system, _votes(system, voters, alpha), growth, region_radius)
+        return relieved(system, votes_of(system, voters, alpha), growth, region_radius)
 
     def spare(alpha: float, found: Relieved | None) -> float:
         return log(max(alpha / needed, found.spare / (1.0 + SPARE) if found else 0.0))
@@ -193,7 +193,7 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
     def room(alpha: float) -> float:
         found = together(alpha)
         beyond = spare(alpha, found)
-        capture = replace_unchecked(box, gains=_votes(system, voters, alpha))
+        capture = replace_unchecked(box, gains=votes_of(system, voters, alpha))
         if beyond >= 0.0 and found is not None and found.spare >= 1.0 and not capture.holds:
             beyond = found.kept(box.tolerance, region_radius)
             capture = replace_unchecked(capture, needed_gain=found.needed(region_radius))
@@ -264,7 +264,8 @@ def too_weak_for_all(system: CanonicalSystem, omega: float | Array,
         system, omega, voters, region_radius, known), sets, np.inf)
 
 
-def _votes(system: CanonicalSystem, voters: Sequence[int], alpha: float) -> Array:
+def votes_of(system: CanonicalSystem, voters: Sequence[int], alpha: float) -> Array:
+    """Gains of voters with a common weight and of nobody else, ndarray (N,) [1/s]."""
     gains = np.zeros(system.graph.size)
     gains[list(voters)] = alpha
     return gains
