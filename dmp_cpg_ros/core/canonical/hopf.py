@@ -119,9 +119,9 @@ class AndronovHopf:
         if self._are_few(x, omega):
             twice = 2.0 * rho
             of = [(rho * (disc - (x_1 * x_1 + x_2 * x_2)), x_1, x_2) for x_1, x_2 in x.tolist()]
-            return np.array([((growth - twice * x_1 * x_1, omega - twice * x_1 * x_2),
-                              (-omega - twice * x_2 * x_1, growth - twice * x_2 * x_2))
-                             for growth, x_1, x_2 in of])
+            return np.array([entry for growth, x_1, x_2 in of for entry in (
+                growth - twice * x_1 * x_1, omega - twice * x_1 * x_2,
+                -omega - twice * x_2 * x_1, growth - twice * x_2 * x_2)]).reshape(-1, 2, 2)
         squared = x * x
         growth = np.asarray(rho * (disc - (squared[..., 0] + squared[..., 1])))
         return (

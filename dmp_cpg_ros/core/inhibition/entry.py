@@ -83,7 +83,9 @@ def eligible_legs(network: GaitNetwork, inhibition: InhibitionParameters) -> tup
 def _holding(p: CanonicalParameters, gain: float, region_radius: float, omega: float
              ) -> tuple[int, ...]:
     number = degrees(p.coupling_graph, len(LEGS))
-    able = {one for one in set(number) if _holds(p, number.index(one), gain, region_radius, omega)}
+    # of the first leg itself nothing is asked
+    asked = {number[leg] for leg in range(len(LEGS)) if leg != p.first_leg}
+    able = {one for one in asked if _holds(p, number.index(one), gain, region_radius, omega)}
     return tuple(leg for leg in range(len(LEGS)) if leg == p.first_leg or number[leg] in able)
 
 
