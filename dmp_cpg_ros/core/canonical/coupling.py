@@ -8,7 +8,7 @@ i leads j (paper, Section 5; Wang & Slotine 2005 for the block Laplacian).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -63,8 +63,7 @@ class CouplingGraph:
         for i, j in self.edges:
             if not (0 <= i < self.size and 0 <= j < self.size and i != j):
                 raise ParameterError(f'edge ({i}, {j}) must join two nodes 0 to {self.size - 1}')
-        symmetric = 0.5 * (self.gains + np.swapaxes(self.gains, 1, 2))
-        for edge, smallest in zip(self.edges, np.linalg.eigvalsh(symmetric)[:, 0], strict=True):
+        for edge, smallest in zip(self.edges, self._sizes[0], strict=True):
             if smallest <= 0.0:
                 raise ParameterError(
                     f'gain of edge {edge} must have a positive definite symmetric part; '
@@ -84,7 +83,7 @@ class CouplingGraph:
         ndarray (2N, 2N)
         """
         return self._block_matrix(
-            self.gains, lambda i, j: phase_rotation(float(self.phases[i] - self.phases[j])))
+            self.gains, self.gains @ _between(self.edges, self.phases.tobytes()))
 
     def block_laplacian(self) -> Array:
         """Block Laplacian L in the co-rotated coordinates, where locked states are equal.
@@ -100,10 +99,11 @@ class CouplingGraph:
 
     @cached_property
     def _locked(self) -> Array:
-        turns, unit = [phase_rotation(float(phi)) for phi in self.phases], np.eye(2)
-        turned = [turns[i].T @ gain @ turns[i]
-                  for (i, _), gain in zip(self.edges, self.gains, strict=True)]
-        return -self._block_matrix(turned, lambda i, j: unit)
+        turned = self.gains
+        if self.weights is None:
+            turns = np.array([phase_rotation(float(self.phases[i])) for i, _ in self.edges])
+            turned = turns.swapaxes(1, 2) @ turned @ turns
+        return -self._block_matrix(turned, turned)
 
     @cached_property
     def comparison(self) -> Array:
@@ -111,13 +111,19 @@ class CouplingGraph:
         L = np.zeros((self.size, self.size))
         if not self.edges:
             return L
-        symmetric = 0.5 * (self.gains + np.swapaxes(self.gains, 1, 2))
-        held = np.linalg.eigvalsh(symmetric)[:, 0]
-        pulled = np.linalg.svd(self.gains, compute_uv=False)[:, 0]
-        for (i, j), weakest, strongest in zip(self.edges, held, pulled, strict=True):
+        for (i, j), weakest, strongest in zip(self.edges, *self._sizes, strict=True):
             L[i, i] += weakest
             L[i, j] -= strongest
         return L
+
+    @cached_property
+    def _sizes(self) -> tuple[Array, Array]:
+        """λ_min of the symmetric part and ‖K_ij‖ of each edge, ndarray (E,) each [1/s]."""
+        if self.weights is not None:
+            return self.weights, np.abs(self.weights)
+        symmetric = 0.5 * (self.gains + np.swapaxes(self.gains, 1, 2))
+        return (np.asarray(np.linalg.eigvalsh(symmetric)[:, 0]),
+                np.asarray(np.linalg.svd(self.gains, compute_uv=False)[:, 0]))
 
     @cached_property
     def strongest(self) -> float:
@@ -129,14 +135,22 @@ class CouplingGraph:
         """Smallest sum of a row of :attr:`comparison` [1/s]: 0 where couplings only average."""
         return float(self.comparison.sum(axis=1).min())
 
-    def _block_matrix(self, gains: Iterable[Array], seen_from: Callable[[int, int], Array]
-                      ) -> Array:
+    def _block_matrix(self, felt: Array, seen: Array) -> Array:
+        """Matrix (2N, 2N) of what nodes feel of themselves (E, 2, 2), negative, and of others."""
         matrix = np.zeros((2 * self.size, 2 * self.size))
-        blocks = matrix.reshape(self.size, 2, self.size, 2).swapaxes(1, 2)
-        for (i, j), gain in zip(self.edges, gains, strict=True):
-            blocks[i, i] -= gain
-            blocks[i, j] += gain @ seen_from(i, j)
+        if self.edges:
+            i, j = np.array(self.edges).T
+            blocks = matrix.reshape(self.size, 2, self.size, 2).swapaxes(1, 2)
+            np.subtract.at(blocks, (i, i), felt)
+            np.add.at(blocks, (i, j), seen)
         return matrix
+
+
+@lru_cache
+def _between(edges: Edges, phases: bytes) -> Array:
+    """Rotations R(φ_ij) of edges, ndarray (E, 2, 2)."""
+    phi = np.frombuffer(phases)
+    return np.array([phase_rotation(float(phi[i] - phi[j])) for i, j in edges]).reshape(-1, 2, 2)
 
 
 def graph_from_edges(size: int, edges: Edges, gain: float | Array,

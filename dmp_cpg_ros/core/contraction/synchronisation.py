@@ -87,7 +87,7 @@ def _without_growth(graph: CouplingGraph) -> Synchronisation:
     found = _best_bound(graph, L, scalar)
     tiny = 1e-9 * (1.0 + float(np.abs(L).max()))
     felt = 0.0 if found.weights is None else float(
-        np.abs(np.kron(found.weights, np.eye(2)) @ L).max())
+        np.abs(found.weights.dot(L.reshape(graph.size, -1))).max())
     return replace(found, free_mean=felt <= tiny, overshoot=overshoot(scalar))
 
 
