@@ -121,19 +121,19 @@ class Relieved(NamedTuple):
         carries = [exponential(-h * M)]
         for _ in range(_DOUBLINGS):
             carries.append(carries[-1].dot(carries[-1]))
-        last, pieces, ends = known, 1, end.tolist()
-        for k in reversed(range(_DOUBLINGS)):
-            later = carries[k].dot(last)
-            if any(w > most for w, most in zip(later.tolist(), ends, strict=True)):
-                last, pieces = later, pieces + 2**k
-        if pieces == 2**_DOUBLINGS:
+        if not (carries[-1].dot(known) <= end).all():
             return -np.inf
-        ws = known[:, None]
-        for carry in carries[:(pieces - 1).bit_length()]:
+        ws, below = known[:, None], np.zeros(1, dtype=bool)
+        for carry in carries:
+            if below[-1]:
+                break
             ws = np.concatenate([ws, carry.dot(ws)], axis=1)
-        implicit = np.linalg.inv(np.eye(N) + h * M)
-        late, early = np.concatenate([implicit, np.eye(N) - h * M]).dot(
-            ws[:, :pieces]).reshape(2, N, -1)
+            below = (ws <= end[:, None]).all(axis=0)
+        if not below[-1]:  # but for rounding it is
+            return -np.inf
+        both = np.eye(N) + h * M
+        both = np.concatenate([np.linalg.inv(both), 2.0 * np.eye(N) - both])
+        late, early = both.dot(ws[:, :int(below.argmax())]).reshape(2, N, -1)
         ahead = np.maximum(late, early)
         line = ahead + beside * (ahead - late).max(axis=0)
         return float((region_radius - self.borne[held, None] - line[held]).min()) / region_radius
