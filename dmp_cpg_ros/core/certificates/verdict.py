@@ -47,7 +47,8 @@ class Verdict:
     certificate : Certificate
         With the change, for every cadence on the way to that of the parameters.
     settled : Certificate or None
-        For that one; None where the change is refused.
+        For that one; None where the change is refused, or where it is still to be computed because
+        another one acts.
     accepted : bool
         Whether no inequality is lost by it.
     reason : str
@@ -93,8 +94,7 @@ class Change:
             return Verdict(certificate, None, False, refused)
         if not lost:
             # in every gait: where what runs holds, nothing fails, and all were looked at
-            return Verdict(certificate, of.settled.certificate() if of.moving else certificate,
-                           True)
+            return Verdict(certificate, None if of.moving else certificate, True)
         reason = ' | '.join(entry.explained() for entry in lost)
         nearest = self._nearest(lost)
         return Verdict(certificate, None, False, f'{reason}; {nearest}')

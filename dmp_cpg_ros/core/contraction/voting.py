@@ -123,17 +123,17 @@ class Relieved(NamedTuple):
             carries.append(carries[-1].dot(carries[-1]))
         if not (carries[-1].dot(known) <= end).all():
             return -np.inf
-        ws, below = known[:, None], np.zeros(1, dtype=bool)
+        ws, pieces = known[:, None], 0
         for carry in carries:
-            if below[-1]:
-                break
             ws = np.concatenate([ws, carry.dot(ws)], axis=1)
-            below = (ws <= end[:, None]).all(axis=0)
-        if not below[-1]:  # but for rounding it is
+            if (ws[:, -1] <= end).all():
+                pieces = int((ws <= end[:, None]).all(axis=0).argmax())
+                break
+        if pieces == 0:  # by rounding alone
             return -np.inf
         both = np.eye(N) + h * M
         both = np.concatenate([np.linalg.inv(both), 2.0 * np.eye(N) - both])
-        late, early = both.dot(ws[:, :int(below.argmax())]).reshape(2, N, -1)
+        late, early = both.dot(ws[:, :pieces]).reshape(2, N, -1)
         ahead = np.maximum(late, early)
         line = ahead + beside * (ahead - late).max(axis=0)
         return float((region_radius - self.borne[held, None] - line[held]).min()) / region_radius

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property, lru_cache, reduce
 from math import log
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
 from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.equilibrium import (
     InhibitedEquilibrium,
@@ -22,6 +22,7 @@ from dmp_cpg_ros.core.contraction.equilibrium import (
     equilibrium_up_to,
 )
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, NONE, inhibited_contraction
+from dmp_cpg_ros.core.contraction.synchronisation import grounded_connectivity
 from dmp_cpg_ros.core.contraction.voting import (
     SPARE,
     Relieved,
@@ -254,14 +255,42 @@ def enough_for_all(system: CanonicalSystem, omega: float | Array,
                    sets: Sequence[Sequence[int]], region_radius: float) -> float:
     """Largest :func:`certified_threshold` of some sets of voters: each is certified at it."""
     return reduce(lambda known, voters: certified_threshold(
-        system, omega, voters, region_radius, known), sets, 0.0)
+        system, omega, voters, region_radius, known), _weakest_first(system, sets), 0.0)
 
 
 def too_weak_for_all(system: CanonicalSystem, omega: float | Array,
                      sets: Sequence[Sequence[int]], region_radius: float) -> float:
     """Smallest :func:`rest_threshold` of some sets of voters: none rests at it."""
     return reduce(lambda known, voters: rest_threshold(
-        system, omega, voters, region_radius, known), sets, np.inf)
+        system, omega, voters, region_radius, known), _weakest_first(system, sets)[::-1], np.inf)
+
+
+def _weakest_first(system: CanonicalSystem, sets: Sequence[Sequence[int]]
+                   ) -> tuple[tuple[int, ...], ...]:
+    """Sets of voters in the order in which they hold the network, so that of most that come later
+    it only has to be seen that they do not matter.
+    """
+    return _in_order(system, tuple(map(tuple, sets)))
+
+
+@lru_cache(MOST_KEPT)
+def _in_order(system: CanonicalSystem, sets: tuple[tuple[int, ...], ...]
+              ) -> tuple[tuple[int, ...], ...]:
+    """By what springs in place of couplings and votes put on the voter that bears most, then by
+    how firmly all are held.
+    """
+    graph, strong = system.graph, max(system.graph.strongest, 1e-300)
+
+    def place(voters: tuple[int, ...]) -> tuple[float, float]:
+        gains = votes_of(system, voters, strong)
+        try:
+            lags = np.linalg.solve(graph.comparison + np.diag(gains), np.full(graph.size, strong))
+        except np.linalg.LinAlgError:
+            return -np.inf, 0.0
+        return (-round(float(lags[list(voters)].max()), 9),
+                round(grounded_connectivity(graph, gains) / strong, 9))
+
+    return tuple(sorted(sets, key=place))
 
 
 def votes_of(system: CanonicalSystem, voters: Sequence[int], alpha: float) -> Array:

@@ -272,6 +272,12 @@ class Certified:
         self._held_in = {}
         if self._verdict is not None:
             self._held = self._verdict.settled
+            if self._verdict.accepted and self._held is None:
+                # while a cadence is on its way this holds, too; the answer did not wait for that
+                # of the one that was asked for
+                self._held, running = self._verdict.certificate, self._running(
+                    self._accepted).settled
+                beside_ticks(self._node, running.certificate, partial(self._learn, running))
             self.report()
         elif self._node.parameter_changes.following:
             needed, self._held = self._held is not None, None
