@@ -202,7 +202,9 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
             return beyond
         rate = capture_set(system, omega, capture.gains, region_radius).rate
         reach = inhibited_contraction(system, replace_unchecked(capture, rate=rate)).reach
-        return -np.inf if reach == NONE else beyond
+        if reach == NONE:
+            return rate / alpha if rate < 0.0 else -np.inf
+        return beyond
 
     if known > 0.0 and (known == np.inf or room(known) >= 0.0):
         return known
@@ -212,7 +214,7 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
         return low
     alone = needed * (1.0 + _PRECISION)
     if alone > low and (above := room(alone)) >= 0.0:
-        return sign_change(room, low, alone, _PRECISION, (below, above))[1]
+        return sign_change(room, low, alone, _PRECISION, (below, above), jumps=True)[1]
     return _threshold(room, scale, lowest=low)[1]
 
 
@@ -316,4 +318,4 @@ def _threshold(room: Callable[[float], float], scale: float, lowest: float = 0.0
         low, high = high, 3.0 * high
         if high > 1000.0 * scale:
             return np.inf, np.inf
-    return sign_change(room, low, high, _PRECISION)
+    return sign_change(room, low, high, _PRECISION, jumps=True)
