@@ -8,6 +8,7 @@ from collections.abc import Callable
 from math import exp, inf
 
 _BEYOND, _JUST, _STEEPEST = 1.2, 0.4, 700.0
+_MOST_IN_A_ROW = 9  # below 0, that a line goes through
 
 
 def last_that_holds(holds: Callable[[float], bool], low: float, high: float, rounds: int) -> float:
@@ -83,7 +84,7 @@ def sign_change(value: Callable[[float], float], low: float, high: float, precis
             smooth = abs(here) <= 0.5 * most and (at == middle or (at < middle) == (here < 0.0))
         in_a_row, beyond = in_a_row + 1 if here < 0.0 else 0, 0.0
         if here < 0.0:
-            if jumps and in_a_row > 1 and -inf < before[1] < here:
+            if jumps and 1 < in_a_row < _MOST_IN_A_ROW and -inf < before[1] < here:
                 beyond = at + (at - before[0]) * here / (before[1] - here)
                 beyond *= 1.0 + _JUST * precision
             before = at, here

@@ -137,6 +137,15 @@ def test_change_of_gait_is_judged_at_the_cadence_that_acts() -> None:
     assert verdict(replace(wanted, acting_cadence=1.0 + 1e-12)).accepted
 
 
+def test_a_change_on_the_way_to_a_cadence_is_answered_before_where_it_settles_is_known() -> None:
+    quick, values = replace(RUNNING, acting_cadence=1.02), {'inhibition_gain': 450.0}
+    for running in (RUNNING, quick):
+        verdict = Change(running, RUNNING.certificate(), running.changed(values)).verdict()
+        assert verdict.accepted and (verdict.settled is None) == running.moving
+    still = Change(RUNNING, RUNNING.certificate(), RUNNING.changed(values))
+    assert still.verdict().settled == still.proposed.settled.certificate()
+
+
 def test_a_refusal_on_the_way_to_a_cadence_says_nothing_of_when_it_has_settled() -> None:
     quick = replace(RUNNING, acting_cadence=2.0)
     change = Change(quick, RUNNING.certificate(), quick.changed({'inhibition_gain': 300.0}))

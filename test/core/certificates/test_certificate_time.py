@@ -11,6 +11,7 @@ import pytest
 from core_examples import TICK, network
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
+from dmp_cpg_ros.core.certificates import settling
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.gate import UNCERTIFIED
 from dmp_cpg_ros.core.certificates.inequality import Certificate
@@ -148,6 +149,27 @@ def test_free_legs_are_in_their_places_within_the_bound_from_inside_and_outside(
         assert ticks * dt <= bound + dt
         if aside == 0.0 and abs(spread - 1.0) > 0.1:
             assert 0.0 < bound < 1.2 * ticks * dt + 0.03    # a bound, and not a platitude
+
+
+def test_a_rest_that_cannot_come_in_time_is_known_as_such_without_going_to_the_horizon(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    def bounds() -> list[float]:
+        return [certificate(
+            network('amble', coupling_graph=graph, coupling_gain=gain), InhibitionParameters(
+                inhibition_gain=600.0)).time_to_rest
+                for graph in ('path', 'star', 'directed_ring')
+                for gain in (15.0, 20.0, 25.0, 30.0, 40.0, 60.0, 100.0)]
+
+    known, looked_at = bounds(), 0
+
+    def too_slow(*_: object) -> bool:
+        nonlocal looked_at
+        looked_at += 1
+        return False
+
+    monkeypatch.setattr(settling, '_too_slow', too_slow)
+    assert bounds() == known
+    assert looked_at > 10 and min(known) < np.inf
 
 
 def test_the_bound_grows_with_the_distance_to_the_speed_of_capture() -> None:

@@ -13,6 +13,7 @@ from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.contraction import equilibrium
 from dmp_cpg_ros.core.contraction.equilibrium import (
     equilibrium_near,
     equilibrium_up_to,
@@ -41,6 +42,22 @@ def test_it_is_where_the_field_vanishes_and_the_simulation_ends(
         x = network.step(x, omega, gains, 0.004)
     assert np.abs(x - rest.state).max() < 1e-6
     assert np.allclose(rest.radius, np.linalg.norm(x, axis=1), atol=1e-6)
+
+
+@settings(max_examples=60)
+@given(name=st.sampled_from(['all_to_all', 'ring', 'path', 'star', 'directed_ring']),
+       gain=st.floats(10.0, 300.0), omega=st.floats(0.0, 30.0), voters=st.sets(
+           st.integers(0, 3), min_size=1), alpha=st.floats(20.0, 600.0))
+def test_what_is_found_at_once_is_what_grows_out_of_the_targets(
+        name: str, gain: float, omega: float, voters: set[int], alpha: float) -> None:
+    network, gains = system(name, gain), np.zeros(4)
+    gains[list(voters)] = alpha
+    at_once = inhibited_equilibrium(network, omega, gains)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(equilibrium, '_ahead', lambda *_: None)
+        grown = inhibited_equilibrium(network, omega, gains)
+    assert (at_once is None) == (grown is None)
+    assert grown is None or np.abs(at_once.state - grown.state).max() < 1e-7
 
 
 @settings(max_examples=60)

@@ -11,7 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.maths.exponential import ExponentialStep, phi_functions
+from dmp_cpg_ros.core.maths.exponential import (
+    ExponentialStep,
+    phi_functions,
+    phi_functions_doubled,
+)
 
 
 def random_matrix(seed: int, n: int, size: float) -> np.ndarray:
@@ -27,6 +31,15 @@ def test_phi_functions_satisfy_their_recursion(seed: int, n: int, size: float) -
         expected = np.eye(n) / factorial(k) + M @ phi[k + 1]
         scale = np.abs(phi[k]).max() + np.abs(M).max() * np.abs(phi[k + 1]).max()
         assert np.allclose(phi[k], expected, atol=1e-12 * (1.0 + scale))
+
+
+@given(seed=st.integers(0, 1000), n=st.integers(1, 6), size=st.floats(0.0, 30.0))
+def test_phi_functions_of_twice_a_matrix_follow_from_its_own(seed: int, n: int, size: float
+                                                             ) -> None:
+    M = random_matrix(seed, n, size)
+    for doubled, known in zip(phi_functions_doubled(phi_functions(M)), phi_functions(2.0 * M),
+                              strict=True):
+        assert np.allclose(doubled, known, rtol=1e-11, atol=1e-11 * np.abs(known).max())
 
 
 @given(seed=st.integers(0, 1000), size=st.floats(0.1, 400.0))

@@ -23,22 +23,39 @@ KINDS: dict[str, Callable[[float], float]] = {
     'unknown': lambda way: math.copysign(math.inf, way)}
 
 
+@pytest.mark.parametrize('jumps', [False, True])
 @pytest.mark.parametrize('kind', KINDS)
 @given(place=st.floats(0.1, 10.0), low=st.floats(0.001, 0.1), high=st.floats(10.0, 100.0))
-def test_ends_are_close_and_on_both_sides(kind: str, place: float, low: float, high: float
-                                          ) -> None:
+def test_ends_are_close_and_on_both_sides(kind: str, jumps: bool, place: float, low: float,
+                                          high: float) -> None:
     asked: list[float] = []
 
     def value(at: float) -> float:
         asked.append(at)
         return KINDS[kind](math.log(at / place))
 
-    below, not_below = sign_change(value, low, high, PRECISION)
+    below, not_below = sign_change(value, low, high, PRECISION, jumps=jumps)
     assert not_below <= below * (1.0 + PRECISION)
     assert below == low or (below in asked and value(below) < 0.0)
     assert not_below == high or (not_below in asked and value(not_below) >= 0.0)
     halvings = math.log2(math.log(high / low) / math.log1p(PRECISION))
     assert len(asked) - 2 <= 3.0 * halvings + 3.0
+
+
+def test_a_jump_at_the_end_of_a_slope_is_found_by_the_slope() -> None:
+    def asked(jumps: bool) -> int:
+        count = 0
+
+        def value(at: float) -> float:
+            nonlocal count
+            count += 1
+            return 0.5 if at >= 0.7 else 0.01 * (at - 0.7)
+
+        low, high = sign_change(value, 0.5, 1.0, PRECISION, (-0.002, 0.5), jumps=jumps)
+        assert low < 0.7 <= high
+        return count
+
+    assert 2 * asked(jumps=True) <= asked(jumps=False)
 
 
 def test_fewer_values_are_asked_for_than_by_halving_where_they_are_smooth() -> None:
