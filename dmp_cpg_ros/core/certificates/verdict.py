@@ -35,7 +35,7 @@ all.
 
 MOST_EFFORT = 24
 """Most :meth:`Running.effort` of a verdict that looks for what would work, for its time to stay
-bounded: 1.5 to 2 ms each on a slow core."""
+bounded: 1 to 1.6 ms each on a slow core."""
 
 
 @dataclass(frozen=True)
