@@ -17,13 +17,19 @@ from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.studies.draws import Case
 from dmp_cpg_ros.studies.oscillator_loop import Oscillators
 
-LONGEST = 12.0
-"""Time after which a stop counts as one that never ends [s]."""
+LONGEST, RECOVERIES = 12.0, 5.0
+"""Time after which a stop counts as one that never ends [s]; and in which radii come back to the
+cycle where that is longer, in 1/(2ρr²): inhibition waits for them.
+"""
+
+FORESEEN = 10.0
+"""Time within which a stop is looked for when it is predicted [s]."""
 
 STRIDE = np.radians(200.0)
 """Turn of a leg at rest that counts as a stride [rad]: more than it may rest ahead."""
@@ -73,7 +79,7 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
     loop, closest, way = Oscillators(description, case, weaken), 0.0, 0.0
     expected: _Expected | None = None
     turned, resting = np.zeros(4), False
-    for wait, kind, value in [*case['events'], [0.0, 'stop', None], [LONGEST, 'end', None]]:
+    for wait, kind, value in [*case['events'], [0.0, 'stop', None], [_longest(case), 'end', None]]:
         for _ in range(round(wait / case['tick_s'])):
             before, gait = phase(loop.x), loop.canon.gait.name
             held, by = loop.held and loop.stop.armed, loop.acting.gains
@@ -110,6 +116,14 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
     return ('' if loop.stop.state == 'at_rest' else 'the last stop does not end'), closest
 
 
+def _longest(case: Case) -> float:
+    """Time after which a stop of a case counts as one that never ends [s]."""
+    given = [case['parameters'], *(value for _, kind, value in case['events'] if kind == 'set')]
+    rho, r = (min(values.get(name, usual) for values in given) for name, usual in (
+        ('rho', CanonicalParameters.rho), ('radius', CanonicalParameters.radius)))
+    return float(max(LONGEST, RECOVERIES / (2.0 * rho * r**2)))
+
+
 def _certain(loop: Oscillators, gains: Array) -> bool:
     """Whether gains (4,) are certified to hold the legs: those of votes alone only have to be able
     to hold them once they are at rest.
@@ -129,7 +143,8 @@ def _kept(loop: Oscillators, expected: _Expected, way: float, tick_s: float) -> 
                 ), 0.0
     if since > expected.bound_s + 1e-9:
         return f'{what} after {since:.3f} s, at most {expected.bound_s:.3f}', 0.0
-    if abs(since - expected.predicted_s) > 1e-6:
+    unseen = expected.predicted_s == np.inf and since > FORESEEN
+    if abs(since - expected.predicted_s) > 1e-6 and not unseen:
         return f'{what} after {since:.3f} s, predicted {expected.predicted_s:.3f}', 0.0
     return '', since / expected.bound_s if expected.stop else 0.0
 
@@ -189,7 +204,7 @@ def _promised(loop: Oscillators, predict: Callable[[], float] | None = None) -> 
     """What is said of a stop that is requested now or is under way."""
     predicted = predict() if predict is not None else loop.request(True)
     bound = loop.time_to_rest() if loop.certified() else np.inf
-    predicted = np.nan if loop.voted_now or loop.ahead else min(predicted, LONGEST)
+    predicted = np.nan if loop.voted_now or loop.ahead else predicted
     return _Expected(loop.now_ns, True, bound, predicted, loop.stop_distance())
 
 

@@ -63,6 +63,19 @@ def test_a_start_that_is_taken_back_before_it_acts_lets_no_leg_go() -> None:
     assert play(ROBOT, again | {'gait': 'bound', 'lead_s': 0.024})[0] == ''
 
 
+def test_a_stop_for_which_radii_come_back_slowly_is_waited_for() -> None:
+    """It takes 12.4 s, and nothing less was said of it."""
+    slow = case({'rho': 0.6644286738287836, 'radius': 0.4388268297057373,
+                 'coupling_graph': 'path'},
+                (0.1009963132184722, 'start', None),
+                (1.025940213398221, 'command', [2.466819375854105, 0.0, 0.4059379119460065]),
+                (0.06359551096290893, 'gait', 'pronk'),
+                (1.1471430028479475, 'command', [1.3143767099557304, 0.0, 0.43256479351503674]),
+                (2.4383223817649085, 'start', None), (2.0, 'stop', None), (2.0, 'start', None))
+    del slow['parameters']['auto_inhibit']
+    assert play(ROBOT, slow)[0] == ''
+
+
 @pytest.mark.parametrize('change', [
     ('gait', 'bound'), ('set', {'cadence_scale': 2.0}), ('set', {'rho': 12.0}),
     ('set', {'region_radius': 0.1})], ids=str)
