@@ -183,7 +183,7 @@ class WalkingLoop:
     def _joint_targets(self, state: RobotState, x_dot: Array, feedback: PostureFeedback,
                        dt: float) -> JointTargets:
         """Targets of all legs."""
-        fl, fr, rl, rr = (self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS)))
+        fl, fr, rl, rr = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
         return JointTargets(
             np.array((*fl.position, *fr.position, *rl.position, *rr.position)),
             np.array((*fl.velocity, *fr.velocity, *rl.velocity, *rr.velocity)),

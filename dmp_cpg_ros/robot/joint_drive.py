@@ -112,8 +112,10 @@ class JointDrive:
         ndarray (12,)
             [N m].
         """
-        return self.limited(
-            self._command[step] - self._kp * position - self._kd * velocity, velocity)
+        torque = self._command[step] - self._kp * position - self._kd * velocity
+        if velocity.dot(velocity) <= self._slow and torque.dot(torque) <= self._weak:
+            return torque  # as nearly always: their lengths are not even beyond the least limits
+        return self.limited(torque, velocity)
 
     def limited(self, torque: Array, velocity: Array) -> Array:
         """Clip torques (..., 12) to what the actuators can give at these speeds.
@@ -121,9 +123,6 @@ class JointDrive:
         Torque along the motion is limited to τ_max up to 0.7 of the speed limit and falls linearly
         to zero at the speed limit; torque against the motion is limited to τ_max only.
         """
-        if (torque.ndim == velocity.ndim == 1 and velocity.dot(velocity) <= self._slow
-                and torque.dot(torque) <= self._weak):
-            return torque  # as nearly always: their lengths are not even beyond the least limits
         if _within(velocity, self._unlimited) and _within(torque, self._limit):
             return torque
         lost = self._slope * velocity

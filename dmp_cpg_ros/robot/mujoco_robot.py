@@ -249,7 +249,7 @@ class MujocoRobot:
             velocities[i] = velocity
             rate, effort = rates[i], torques[i]
             rate[:] = qvel[dof]
-            effort[:] = strength * torque(i, qpos[q], rate)
+            np.multiply(strength, torque(i, qpos[q], rate), effort)
             inputs[where] = effort * per_torque
             if self._push_steps >= 0:
                 self._push_on()

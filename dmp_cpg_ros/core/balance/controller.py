@@ -301,7 +301,7 @@ class PostureController:
         return memory.terrain.felt(
             place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot, _ in legs],
             n, swung, touches, self.scale.leg_length, calm,
-            all(end.steps == len(LEGS) for end in gait.ends), rests, quiet * dt, dt)
+            all([end.steps == len(LEGS) for end in gait.ends]), rests, quiet * dt, dt)
 
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], stride: Stride,
                  under: Pair, error: Pair) -> tuple[float, ...]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -134,5 +135,9 @@ class AndronovHopf:
         needs to begin.
         """
         return (x.size <= FEW and x.ndim == 2 and x.dtype.char == 'd'
-                and isinstance(omega, float) and isinstance(self.rho, float)
-                and isinstance(self.radius, float))
+                and isinstance(omega, float) and self._are_alike)
+
+    @cached_property
+    def _are_alike(self) -> bool:
+        """Whether all oscillators have the same numbers."""
+        return isinstance(self.rho, float) and isinstance(self.radius, float)

@@ -150,7 +150,7 @@ class BodyEstimator:
         noise = replace(self.parameters, **BLIND_NOISE) if blind else self.parameters
         measured = ((readings.rate_in_base, readings.specific_force_in_base) if seeing
                     else self._guessed(memory, readings, told, blind))
-        rate, force = (triple(of.tolist()) for of in measured)
+        rate, force = triple(measured[0].tolist()), triple(measured[1].tolist())
         (x, y, z), (last_x, last_y, last_z) = rate, memory.rate
         mean = 0.5 * (last_x + x), 0.5 * (last_y + y), 0.5 * (last_z + z)
         state = velocity_filter.predict(memory.filter, mean, force, dt, noise, not seeing)

@@ -172,13 +172,14 @@ def without_frozen(watch: SensorWatch, readings: SensorReadings, weight: float
     doubt = watch.doubt
     if jumps or any(doubt.legs):
         doubt = _in_doubt(watch, readings, jumps)
+    doubtful = any(doubt.legs)
     told, since, until, passed = _without_repeated(watch, readings, HELD * weight)
-    if any(doubt.legs):
+    if doubtful:
         passed = _without(passed, doubt.all_at_once, doubt.legs, doubt.all_at_once)
     known = _known(watch, passed)
     usual = watch.usual + _share(1e-9 * (readings.time_ns - watch.readings.time_ns)) * (
         known - watch.usual)
-    if any(doubt.legs):
+    if doubtful:
         usual = np.where(np.repeat(doubt.legs, 3), watch.usual, usual)
     oldest, past = readings.time_ns - PAST_NS, (*watch.past, last)
     past = past[1:] if past[0].time_ns < oldest else past
@@ -190,8 +191,8 @@ def _heard(watch: SensorWatch, readings: SensorReadings
     """Stamps at which each joint was heard last, and by how much joints jumped [rad]."""
     last, now, heard, jumps = watch.readings, readings.joints_ns, [*watch.heard_ns], {}
     late = watch.doubt.late_ns.tolist() if any(watch.doubt.legs) else None
-    before, rate, rate_before = (of.tolist() for of in (
-        last.joint_position, readings.joint_velocity, last.joint_velocity))
+    before, rate, rate_before = (last.joint_position.tolist(), readings.joint_velocity.tolist(),
+                                 last.joint_velocity.tolist())
     for i, q in enumerate(readings.joint_position.tolist()):
         change = q - before[i]
         if not (change > 0.0 or change < 0.0):  # not a number included

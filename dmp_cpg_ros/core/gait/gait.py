@@ -13,6 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import inf, nan, tau
 from typing import Any, NamedTuple
 
@@ -37,7 +38,6 @@ of one that stands on one side only.
 
 WIDE_STANCE = 0.75
 """Share of stance on both sides, or ends, from which on a gait counts as standing on both."""
-
 
 KEYS = {
     'lag': Key('number by leg', 'fraction of a cycle by which the leg follows fl, in [0, 1)'),
@@ -128,7 +128,7 @@ class CycleOfLegs(ABC):
         """
         return omega
 
-    @property
+    @cached_property
     def wide(self) -> float:
         """1 where feet of both sides stand for long enough, 0 where one side stands alone."""
         return min(1.0, self.two_sided / WIDE_STANCE)

@@ -138,6 +138,7 @@ class GaitNetwork:
         self.parameters, self.scale, self.change_rate = parameters, scale, change_rate
         self.gait: GaitInForce = gait.scaled(parameters.cadence_scale)
         self._systems: dict[bytes, CanonicalSystem] = {}
+        self._asked: tuple[list[float], float] | None = None
 
     def of(self, gait: GaitInForce) -> GaitNetwork:
         """Return the same oscillators in a gait or blend, at the cadence that it has; what was
@@ -146,7 +147,7 @@ class GaitNetwork:
         if gait is self.gait:
             return self
         other = copy(self)
-        other.gait = gait
+        other.gait, other._asked = gait, None
         for name in ('system', 'target'):
             other.__dict__.pop(name, None)
         return other
@@ -195,8 +196,13 @@ class GaitNetwork:
         return self.scale.speed(self.gait.highest(self.scale))
 
     def omega(self, r: Array) -> float:
-        """Angular frequency ω [rad/s] at a reference r = (v_x, v_y, γ), ndarray (3,)."""
-        return self.gait.omega(self.scale.foot_speed(*r.tolist()), self.scale)
+        """Angular frequency ω [rad/s] at a reference r = (v_x, v_y, γ), ndarray (3,); the last
+        answer is kept, for a tick asks several times.
+        """
+        asked = r.tolist()
+        if self._asked is None or self._asked[0] != asked:
+            self._asked = asked, self.gait.omega(self.scale.foot_speed(*asked), self.scale)
+        return self._asked[1]
 
     def advance(self, x: Array, r: Array, inhibition: Inhibition, dt: float,
                 feedback: Array | float = 0.0) -> tuple[GaitNetwork, Array]:

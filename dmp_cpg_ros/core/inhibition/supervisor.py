@@ -177,7 +177,7 @@ class GaitSupervisor:
         speed = network.scale.foot_speed(*r.tolist())
         activity = activities_step(
             state.activity, [rate + gait.rest_rate for rate in rates],
-            gait.own_omegas(gait.omega(speed, network.scale)), self.activity_rate, dt)
+            gait.own_omegas(network.omega(r)), self.activity_rate, dt)
         state = replace_unchecked(state, time_ns=time_ns, activity=activity)
         if body_mode != 'standing':
             state = self._barred(state, body_mode)

@@ -48,11 +48,10 @@ def replace_unchecked(record: Record, **values: Any) -> Record:
         If there is no such field; the valid ones are listed.
     """
     copy = object.__new__(type(record))
-    held = copy.__dict__
-    held.update(record.__dict__)
-    fields = len(held)
-    held.update(values)
-    if len(held) != fields:
-        valid = ', '.join(record.__dict__)
+    held, before = copy.__dict__, record.__dict__
+    held |= before
+    held |= values
+    if len(held) != len(before):
+        valid = ', '.join(before)
         raise TypeError(f'{type(record).__name__} has the fields {valid}, not all of {[*values]}')
     return copy
