@@ -24,12 +24,15 @@ from collections import deque
 from math import exp
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets, RobotState
 from dmp_cpg_ros.robot.drive_offsets import DriveOffsets
 from dmp_cpg_ros.robot.joint_drive import JointDrive
+
+Mask = NDArray[np.bool_]
 
 MEMORY_S = 0.02
 """Time constant with which what was is forgotten [s]."""
@@ -168,14 +171,14 @@ class DriveWatch:
             self._reports = bool((much & (shared > WORKS * power)).any())
             return
         failing = (much & (shared < FOLLOWS * power)).all(axis=0)
-        if failing.any():
+        if np.count_nonzero(failing):
             failing &= (news[6:8] < FOLLOWS * news[5:3:-1]).all(axis=0)
         failing, self._failing_now = failing & self._failing_now, failing
         if self.cuts and self.lame:
             failing |= np.repeat([leg in self.lame for leg in LEGS], len(JOINTS_OF_LEG))
         if self.offsets.known:
             failing |= self.offsets.offset != 0.0
-        if failing.any():
+        if np.count_nonzero(failing):
             self._failed_ns = np.where(failing, now, self._failed_ns)
         elif not self.failing:
             return
@@ -204,6 +207,16 @@ class DriveWatch:
             asked = np.concatenate([asked, *older])
         return np.asarray(np.clip(given, asked.min(axis=0), asked.max(axis=0)))
 
+    def _are_wild(self, now: int, unexplained: Mask) -> Mask:
+        """Legs (4,) whose torques change wildly, or that have just got their power back and give
+        what nobody asks for, where it is ``unexplained`` in the mean.
+        """
+        means = self._means
+        followed = (np.maximum(means[6:8], 0.0) ** 2 / np.maximum(means[5:3:-1], 1e-9)).max(axis=0)
+        kicks = np.minimum(means[8] - means[3] * means[3], means[8] - followed)
+        wild = kicks.reshape(len(LEGS), -1).sum(axis=1) > WILD
+        return np.asarray(wild | (now - self._back_ns < TRIED_NS) & unexplained)
+
     def _watch_legs(self, now: int) -> None:
         """Judge whether a leg moves without any torque."""
         means = self._means
@@ -214,23 +227,19 @@ class DriveWatch:
         high = np.maximum(np.maximum(first, second), 0.0) + np.maximum(friction, 0.0)
         unasked = mean - np.minimum(np.maximum(mean, low), high)
         strange = (unasked * unasked).reshape(len(LEGS), -1).sum(axis=1)
-        strangely = strange > STRANGE * STRANGE
+        strangely = unexplained = strange > STRANGE * STRANGE
         if self.offsets.known:  # what drives give that are off nobody asks for
-            strangely |= self.offsets.offset.reshape(len(LEGS), -1).any(axis=1)
-        self._strange_ns = np.where(strangely, now, self._strange_ns)
+            strangely = unexplained | self.offsets.offset.reshape(len(LEGS), -1).any(axis=1)
+        if np.count_nonzero(strangely):
+            self._strange_ns = np.where(strangely, now, self._strange_ns)
         limp = ((asked > MUCH * MUCH) & (np.maximum(reported, explained) < LIMP * asked)
                 & (moves > MOVES * MOVES) & (now - self._strange_ns > STRANGE_NS))
-        if limp.any():
+        if np.count_nonzero(limp):
             asked, *shared, reported = self._news[5:9].reshape(4, len(LEGS), -1).sum(axis=2)
             limp &= np.maximum(reported, np.maximum(*shared)) < LIMP * asked
         limp, self._limp_now = limp & self._limp_now, limp
-        followed = (np.maximum(means[6:8], 0.0) ** 2 / np.maximum(means[5:3:-1], 1e-9)).max(axis=0)
-        kicks = np.minimum(means[8] - mean * mean, means[8] - followed)
-        wild = kicks.reshape(len(LEGS), -1).sum(axis=1) > WILD
-        tried = now - self._back_ns < TRIED_NS
-        wild |= tried & (strange > STRANGE * STRANGE)
-        lame = (limp | (wild & self.cuts)) & self._reports
-        if lame.any():
+        lame = limp | self._are_wild(now, unexplained) if self.cuts else limp
+        if self._reports and np.count_nonzero(lame):
             self._lame_ns = np.where(lame, now, self._lame_ns)
         elif not self.lame:
             return
