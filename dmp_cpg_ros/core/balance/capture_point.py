@@ -24,7 +24,6 @@ from collections.abc import Sequence
 from math import hypot, sqrt
 
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 EDGES = {'front': ('fl', 'fr'), 'right': ('fr', 'rr'), 'rear': ('rr', 'rl'), 'left': ('rl', 'fl')}
@@ -36,15 +35,15 @@ WIDE = (1e3,) * len(EDGES)
 _ENDS = tuple((LEGS.index(a), LEGS.index(b)) for a, b in EDGES.values())
 
 
-def support_margins(feet: Sequence[Triple], under: tuple[float, float],
+def support_margins(feet: Sequence[Sequence[float]], under: tuple[float, float],
                     velocity: tuple[float, float], height: float, friction: float, reach: float
                     ) -> tuple[float, ...]:
     """Margins to the four edges [m]; negative where standing legs cannot bear the velocity.
 
     Parameters
     ----------
-    feet : sequence of four tuples of float
-        Relative to the centre of mass in the frame of the ground [m].
+    feet : sequence of four sequences of float
+        Their x and y relative to the centre of mass in the frame of the ground [m].
     under : tuple of float
         Where the vertical through the centre of mass meets the ground, in the same frame [m].
     velocity : tuple of float
@@ -64,7 +63,7 @@ def support_margins(feet: Sequence[Triple], under: tuple[float, float],
     time, cone, margins = sqrt(height / GRAVITY), friction * height, []
     (c_x, c_y), (v_x, v_y) = under, velocity
     for a, b in _ENDS:
-        x, y, _ = feet[a]
+        x, y = feet[a][0], feet[a][1]
         along_x, along_y = feet[b][0] - x, feet[b][1] - y
         length = max(hypot(along_x, along_y), 1e-6)
         out_x, out_y = -along_y / length, along_x / length

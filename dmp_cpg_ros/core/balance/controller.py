@@ -306,11 +306,13 @@ class PostureController:
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], stride: Stride,
                  under: Pair, error: Pair) -> tuple[float, ...]:
         """Margins of the capture point for an error of the velocity [m/s]; swings at footholds."""
-        places, downhill, slope_lean = [], (*under, 0.0), self.parameters.slope_lean
-        for i, foot in enumerate(feet):
-            foothold = vec3.times(R_ground_base, self._footholds[i])
-            place = vec3.moved(foothold, downhill, slope_lean)
-            places.append(vec3.moved(foot, vec3.minus(place, foot), stride.activity[i]))
+        places, slope_lean = [], self.parameters.slope_lean
+        aside_x, aside_y = slope_lean * under[0], slope_lean * under[1]
+        for i, (foot_x, foot_y, _) in enumerate(feet):
+            x, y, _ = vec3.times(R_ground_base, self._footholds[i])
+            share = stride.activity[i]
+            places.append((foot_x + (x + aside_x - foot_x) * share,
+                           foot_y + (y + aside_y - foot_y) * share))
         return support_margins(
             places, under, error, self.model.height, self.parameters.friction, self._room)
 

@@ -285,10 +285,9 @@ def _repeated_forces(readings: SensorReadings, last: SensorReadings) -> list[boo
     """Which feet are loaded and tell the same force again, while that of another one changes."""
     changes = [now - before if now != 0.0 and before != 0.0 else nan for now, before in zip(
         readings.foot_force.tolist(), last.foot_force.tolist(), strict=True)]
-    repeated = [change == 0.0 for change in changes]
-    if any(repeated) and not any(abs(change) > 0.0 for change in changes):
+    if 0.0 not in changes or not any(abs(change) > 0.0 for change in changes):
         return [False] * N
-    return repeated
+    return [change == 0.0 for change in changes]
 
 
 def _without(readings: SensorReadings, imu: bool, legs: ArrayLike, contacts: ArrayLike

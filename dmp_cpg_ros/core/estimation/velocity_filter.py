@@ -147,7 +147,8 @@ def predict(state: FilterState, rate: Triple, specific_force: Triple, dt: float,
     velocity = moved(minus(plus(v, change), back), twice, 0.5)
     F = _IDENTITY if guessed else transition(v, up, turning, dt)
     P = F.dot(state.covariance).dot(F.T)
-    P.ravel()[::13] += noise.spread * dt
+    variances = P.ravel()[::13]
+    variances += noise.spread * dt
     return FilterState(turned(state.quaternion, turn), velocity, state.gyro_bias,
                        state.accelerometer_bias, P)
 

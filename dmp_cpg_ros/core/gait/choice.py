@@ -150,5 +150,5 @@ def changing_to(parameters: GaitChoiceParameters, gait: GaitInForce, asked: Gait
     chosen only once it has begun. None for none.
     """
     if not parameters.auto_gait:
-        return Changing(asked)
+        return None if gait.name == asked.name else Changing(asked)
     return Changing(gait.ends[-1], True) if len(gait.ends) > 1 else None

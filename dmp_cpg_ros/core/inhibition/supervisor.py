@@ -35,6 +35,7 @@ from dmp_cpg_ros.core.gait.choice import Changing
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.blocked import NO_BLOCK, Progress, block_step
 from dmp_cpg_ros.core.inhibition.caution import (
+    DISTURBED,
     changing_share,
     falls,
     followed_share,
@@ -175,10 +176,9 @@ class GaitSupervisor:
             state = state.carried(time_ns)
         gait, rates = network.gait, scalar_phase_rates(x, x_dot)
         speed = network.scale.foot_speed(*r.tolist())
-        activity = activities_step(
+        state = replace_unchecked(state, time_ns=time_ns, activity=activities_step(
             state.activity, [rate + gait.rest_rate for rate in rates],
-            gait.own_omegas(network.omega(r)), self.activity_rate, dt)
-        state = replace_unchecked(state, time_ns=time_ns, activity=activity)
+            gait.own_omegas(network.omega(r)), self.activity_rate, dt))
         if body_mode != 'standing':
             state = self._barred(state, body_mode)
         elif self.parameters.auto_inhibit:
@@ -208,9 +208,10 @@ class GaitSupervisor:
             share = followed_share(state.share, left if p.caution else None, dt, most,
                                    least_share(progress.rough, progress.gaps, falling))
         waits = not state.push.acts and (predicted or (progress.rough and not falling))
-        fastest, free = fastest_lately(state.fastest, r, dt), p.step_timing and not waits
-        quickness = quickened(state.quickness, left if free else None, dt, quickest(
-            network, state.quickness, r, progress.velocity, fastest))
+        fastest = fastest_lately(state.fastest, r, dt)
+        hurries = p.step_timing and not waits and left is not None and left < DISTURBED
+        quickness = quickened(state.quickness, left if hurries else None, dt, quickest(
+            network, state.quickness, r, progress.velocity, fastest) if hurries else 1.0)
         return replace_unchecked(state, share=share, quickness=quickness, fastest=fastest)
 
     def _automatic(self, state: SupervisorState, commanded: bool) -> SupervisorState:
@@ -233,8 +234,7 @@ class GaitSupervisor:
         block = state.block
         if block.acts:
             if not any(command):
-                block = block._replace(ahead=(0.0, 0.0))
-                return replace_unchecked(state, block=block)
+                return replace_unchecked(state, block=block._replace(ahead=(0.0, 0.0)))
             stays = block.leads_there(command) or not state.automatic or body_mode != 'standing'
             return state if stays else self.request(state, False, True)
         if not self.parameters.block_stop or state.requested or state.push.acts or (
