@@ -232,9 +232,9 @@ class DriveWatch:
             strangely = unexplained | self.offsets.offset.reshape(len(LEGS), -1).any(axis=1)
         if np.count_nonzero(strangely):
             self._strange_ns = np.where(strangely, now, self._strange_ns)
-        limp = ((asked > MUCH * MUCH) & (np.maximum(reported, explained) < LIMP * asked)
-                & (moves > MOVES * MOVES) & (now - self._strange_ns > STRANGE_NS))
+        limp = (asked > MUCH * MUCH) & (np.maximum(reported, explained) < LIMP * asked)
         if np.count_nonzero(limp):
+            limp &= (moves > MOVES * MOVES) & (now - self._strange_ns > STRANGE_NS)
             asked, *shared, reported = self._news[5:9].reshape(4, len(LEGS), -1).sum(axis=2)
             limp &= np.maximum(reported, np.maximum(*shared)) < LIMP * asked
         limp, self._limp_now = limp & self._limp_now, limp

@@ -40,7 +40,7 @@ from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
 from dmp_cpg_ros.core.gait.contact_feedback import believed, quarter_weight
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.blocked import Progress
-from dmp_cpg_ros.core.maths import Array, clamped, vec3
+from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Pair, Triple
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -346,4 +346,5 @@ class PostureController:
             LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
         torques = [torque for i, (_, J) in enumerate(legs) for torque in vec3.transposed_times(
             J, vec3.transposed_times(body.R_ground_base, forces[i]))]
-        return [clamped(-torques[i], -most, most) for i, most in enumerate(self._torque_limit)]
+        return [-most if torque > most else most if torque < -most else -torque
+                for torque, most in zip(torques, self._torque_limit, strict=True)]
