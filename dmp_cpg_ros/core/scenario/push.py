@@ -136,6 +136,8 @@ class PushQueue:
 
     def due(self, now_ns: int) -> PushForce | None:
         """The newest force whose time has come since the last call, or None."""
+        if not self._waiting:
+            return None
         count = bisect_right(self._waiting, now_ns, key=_time)
         due, self._waiting = self._waiting[:count], self._waiting[count:]
         return due[-1] if due else None
