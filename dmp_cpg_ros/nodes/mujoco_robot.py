@@ -13,7 +13,6 @@ import sys
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -71,6 +70,9 @@ TURN_TICKS = 25
 
 VOTING_TOPICS = ('imu', 'foot_contacts')
 """What the inhibition reads when sensors can vote."""
+
+SENSED_TOPICS = (*VOTING_TOPICS, 'joint_states')
+"""What the robot feels."""
 
 STATE_TOPICS = ('/clock', 'imu', 'ground_truth', 'foot_contacts', 'joint_states')
 """What the robot publishes at every tick, the tick itself last: between nodes of one process, what
@@ -218,9 +220,8 @@ class MujocoRobotNode(DrivenRobot):
             self._tell_failures(self._faults.acting)
         self._timing.published(stamp)
         self._publish_all()
-        if self.lock_step and self.parameters_of(VotingSwitch).voting:
-            self._told.append({name: deepcopy(getattr(writer, name)) for name in VOTING_TOPICS
-                               if getattr(writer, name) is not None})
+        if self.lock_step:
+            self._told.append({name: getattr(writer, name) for name in SENSED_TOPICS})
         self.end_tick()
 
     def _publish_all(self) -> None:
@@ -232,8 +233,8 @@ class MujocoRobotNode(DrivenRobot):
 
     def _tell_again(self) -> None:
         """Tell the last tick again, for a node that was restarted and may not have heard it; and
-        of the tick before what the inhibition reads, which may have died before its tick ended:
-        what it says acts one tick later, so that the robot had gone on.
+        what is sensed of the one before: the inhibition may have died before that tick ended, with
+        who tells it of the body; what it says acts one tick later, so that the robot had gone on.
         """
         if len(self._told) > 1:
             for name, message in self._told[0].items():

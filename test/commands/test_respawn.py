@@ -233,6 +233,43 @@ PostureControl.on_tick = failing
 """What lets a node fail at every tick after the first second, in each Python that starts."""
 
 
+DYING = """
+import os, signal
+from pathlib import Path
+from dmp_cpg_ros.nodes.inhibition import InhibitionNode
+
+on_tick, died = InhibitionNode.on_tick, Path(__file__).with_name('died')
+
+
+def dying(self, stamp_ns, values):
+    if stamp_ns > 1_000_000_000 and not died.exists():
+        died.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    on_tick(self, stamp_ns, values)
+
+
+InhibitionNode.on_tick = dying
+"""
+"""What lets the first process with the inhibition die within a tick that it ends for others."""
+
+
+def test_in_lock_step_a_block_that_dies_in_its_tick_is_told_of_it_again(
+        processes: Processes, tmp_path: Path) -> None:
+    """The posture of the tick was sent, so that the robot had gone on; what the inhibition says of
+    it, which acts in the next one, was not, and both have forgotten it.
+    """
+    site = tmp_path / 'site'
+    site.mkdir()
+    (site / 'sitecustomize.py').write_text(DYING, encoding='utf-8')
+    paths = os.pathsep.join((str(site), processes.environment['PYTHONPATH']))
+    process = processes.python(
+        '-c', WATCHFUL, str(scenario(tmp_path, 4.0)), '--no-report', '--out',
+        str(tmp_path / 'run'), *LOCK_STEP, '--processes', 'blocks', '--respawn', PYTHONPATH=paths)
+    assert process.wait(RUN_S) == 0, str(process)
+    assert 'supervision was ended by signal 9 (SIGKILL)' in process.output
+    assert_undisturbed(tmp_path / 'run')
+
+
 def test_in_lock_step_a_node_that_fails_in_its_tick_is_named_and_ends_the_run(
         tmp_path: Path) -> None:
     """Both ways at once, for most of their time they wait."""
