@@ -83,7 +83,8 @@ class CouplingGraph:
         ndarray (2N, 2N)
         """
         return self._block_matrix(
-            self.gains, self.gains @ _between(tuple(self.edges), self.phases.tobytes()))
+            self.gains, self.gains @ _between(
+                tuple(map(tuple, self.edges)), self.phases.tobytes()))
 
     def block_laplacian(self) -> Array:
         """Block Laplacian L in the co-rotated coordinates, where locked states are equal.
