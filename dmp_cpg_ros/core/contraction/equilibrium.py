@@ -103,15 +103,14 @@ def equilibrium_up_to(system: CanonicalSystem, omega: float | Array, gains: Arra
     It is looked for at once, near where it would be if couplings were springs. Where none is there
     that is stable, it is followed from where it is known or from the targets.
     """
-    x: Array | None = system.target if known is None else known
-    assert x is not None
-    near = _ahead(system, x, (1.0 - share) * omega, gains)
+    begin = system.target if known is None else known
+    near = _ahead(system, begin, (1.0 - share) * omega, gains)
     whole = None if near is None else _newton(system, near, omega, gains)
     if whole is not None:
         found = described(system, whole, omega, gains)
         if found.slowest_rate > 0.0:
             return found, 1.0
-    x = x if known is not None else _newton(system, x.copy(), 0.0 * omega, gains)
+    x = known if known is not None else _newton(system, begin.copy(), 0.0 * omega, gains)
     if x is None:
         return None, 0.0
     step = 0.5

@@ -47,8 +47,8 @@ def phi_functions(M: Array, highest: int = 3) -> list[Array]:
 
 
 def phi_functions_doubled(phi: Sequence[Array]) -> list[Array]:
-    """φ₀ … φ_m of twice a matrix from those of it: φ_k(2M) = 2^(−k) (φ₀φ_k + Σ_j φ_j/(k − j)!), j
-    from 1 to k.
+    """φ₀ … φ_m of twice a matrix from those of it, ndarray (n, n) each: φ_k(2M) = 2^(−k) (φ₀φ_k +
+    Σ_j φ_j/(k − j)!), j from 1 to k.
     """
     return [0.5**k * (phi[0].dot(phi[k]) + sum(
         phi[j] / factorial(k - j) for j in range(1, k + 1))) for k in range(len(phi))]
