@@ -20,7 +20,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 from rclpy.task import Future
-from ros_processes import Ros, wait_until
+from ros_processes import Ros
 
 from dmp_cpg_ros.core.canonical.coupling import graph_from_edges
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
@@ -141,18 +141,6 @@ def stopped_judge() -> Iterator[None]:
         yield
     finally:
         os.kill(pid, signal.SIGCONT)
-
-
-def test_what_judges_is_there_before_a_change_is_asked_for(walking: Walking) -> None:
-    """To start it takes longer than to judge."""
-    judge.cache_clear()
-    walking.tick(500)
-    wait_until(lambda: judge().pid is not None)
-    with stopped_judge():
-        asked = walking.ask(coupling_gain=90.0)
-        walking.tick(10)
-        assert not asked.done()
-    assert walking.answer(asked) == (True, '')
 
 
 def test_ticks_go_on_while_a_change_is_judged(walking: Walking) -> None:

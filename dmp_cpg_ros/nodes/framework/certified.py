@@ -34,7 +34,7 @@ from dmp_cpg_ros.core.reference.governor import Governor
 from dmp_cpg_ros.core.transformation.leg import LegParameters, body_scale
 from dmp_cpg_ros.core.voting.parameters import VotingParameters
 from dmp_cpg_ros.nodes.framework.gaits import description_of, known_gaits
-from dmp_cpg_ros.nodes.framework.judging import Step, beside_ticks, judge
+from dmp_cpg_ros.nodes.framework.judging import Step, beside_ticks
 from dmp_cpg_ros.nodes.framework.parameter_follower import ParameterFollower
 from dmp_cpg_ros.nodes.framework.parameters import Sets
 from dmp_cpg_ros.nodes.messages.commands import read_twist
@@ -216,13 +216,6 @@ class Certified:
 
         return change.verdict, learn
 
-    def prepare(self) -> None:
-        """Have what judges beside the ticks ready, once: its start takes longer than a verdict."""
-        if not self._node.lock_step and judge().idle:
-            running = self._running(self._accepted)
-            beside_ticks(self._node, partial(_rehearsed, running),
-                         partial(self._learn, running.settled))
-
     def _asked(self, sets: Sets) -> tuple[dict[str, Any], Change] | None:
         """Values that change, and the change; None where there is nothing to judge: no inequality
         depends on it, or its owner has accepted it. Raises ParameterError for unknown gaits.
@@ -349,14 +342,6 @@ class Certified:
             of(GaitChoiceParameters), of(suite.GaitParameters).gait, self.gaits.named,
             of(CanonicalParameters).cadence_scale,
             self._acting().cadence if self._node.configured else None)
-
-
-def _rehearsed(running: gate.Running) -> Certificate:
-    """Certificate of what runs, by way of a verdict."""
-    present = running.settled
-    certificate = present.certificate()
-    Change(present, certificate, present, (present.gait,)).verdict()
-    return certificate
 
 
 def certificate_words(certificate: Certificate) -> str:

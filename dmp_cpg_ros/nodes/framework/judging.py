@@ -4,9 +4,8 @@
 
 A verdict on a change of parameters takes several ticks. It is a function of values alone, so that
 another process can find it while the node goes on: threads of one interpreter would share its
-lock, and a tick would wait for it at every product of matrices. The process is started with the
-first ticks, or when it is first asked; it yields to the nodes, and ends with the one that started
-it.
+lock, and a tick would wait for it at every product of matrices. The process is started when it is
+first needed, yields to the nodes, and ends with the one that started it.
 """
 
 from __future__ import annotations
@@ -57,11 +56,6 @@ class Judge:
         self._asked: queue.SimpleQueue[tuple[Compute, Use]] = queue.SimpleQueue()
         self._process: subprocess.Popen[bytes] | None = None
         self._thread: threading.Thread | None = None
-
-    @property
-    def idle(self) -> bool:
-        """Whether nothing has been asked yet."""
-        return self._thread is None
 
     @property
     def pid(self) -> int | None:

@@ -253,11 +253,9 @@ class SuiteNode(ConnectedNode):
 
     def end_tick(self) -> None:
         """End a tick: once a second of the robot's clock, look for commands of a wrong type, and
-        report; from the first one on changes are judged without a delay.
+        report.
         """
         if self.health.due():
-            if self.certified is not None:
-                self.certified.prepare()
             self._commands.watch_types()
             self._watch_services()
             self.report(periodic=True)
