@@ -235,8 +235,9 @@ class MujocoRobotNode(DrivenRobot):
         """Tell the last tick again, for a node that was restarted and may not have heard it; and
         what is sensed of the one before: the inhibition may have died before that tick ended, with
         who tells it of the body; what it says acts one tick later, so that the robot had gone on.
+        Who holds has had targets of the last tick, so that all have ended the one before.
         """
-        if len(self._told) > 1:
+        if len(self._told) > 1 and not self._holding:
             for name, message in self._told[0].items():
                 self._state_publishers[name].publish(message)
         self._publish_all()
