@@ -43,9 +43,9 @@ from dmp_cpg_ros.nodes.messages.robot_state import (
     read_orientation,
 )
 from dmp_cpg_ros.nodes.messages.values import checked, header_ns, sensed
+from dmp_cpg_ros.robot.absent_legs import CARRIED_NS
 from dmp_cpg_ros.robot.drive_watch import DriveWatch
 from dmp_cpg_ros.robot.joint_drive import JointDrive
-from dmp_cpg_ros.robot.watchdog import CARRIED_NS
 from dmp_cpg_ros.suite_table import DRIVER, KINDS
 
 FRESH_NS = 100_000_000

@@ -10,6 +10,7 @@ which the memory resembles its own end most.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -22,11 +23,19 @@ SHORTEST_S, LONGEST_S = 0.2, 1.6
 END_S = 0.1
 """Part at the end of the memory that is compared with what was before [s]."""
 
-ALIKE = 0.25
+ALIKE = 0.15
 """Largest mean squared deviation, as a share of the variance, of what counts as a rhythm."""
 
 GRID_S = 0.004
 """Time step of the memory [s]."""
+
+KEEPING_S, KEEPS, STEADY = 0.04, 0.25, 1.0
+"""Time constant with which a rhythm keeps time with legs that are heard [s], by which share it is
+faster or slower at most, and speed of joints below which their angles tell little of it [rad/s].
+"""
+
+GAP_NS = 60_000_000
+"""Time without targets of a leg that nothing is known of [ns]."""
 
 KEPT = 2048
 """Targets of each leg that are remembered, at most."""
@@ -58,8 +67,8 @@ class LastCycle:
         if not all(self._heard):
             return None
         end_ns = min(heard[-1][0] for heard in self._heard)
-        begin_ns = max(end_ns - round((LONGEST_S + END_S) * 1e9),
-                       *(heard[0][0] for heard in self._heard))
+        begin_ns = end_ns - round((LONGEST_S + END_S) * 1e9)
+        begin_ns = max(begin_ns, *(_unbroken_since(heard, begin_ns) for heard in self._heard))
         count = round((end_ns - begin_ns) * 1e-9 / GRID_S)
         compared, first = round(END_S / GRID_S), round(SHORTEST_S / GRID_S)
         if count < first + compared:
@@ -96,17 +105,42 @@ class Rhythm:
     def __init__(self, end_ns: int, memory: Array) -> None:
         """Keep one period, and by how much its ends differ."""
         self.end_ns, self._memory = end_ns, memory
+        self._ahead_s, self._kept_ns = 0.0, end_ns
         self.period_s = GRID_S * (len(memory) - 1)
         self._gap = memory[-1] - memory[0]
 
     def at(self, time_ns: int) -> Array:
         """Targets (3, 12) at a stamp after the end; the ends' difference fades within a period."""
-        ahead = (time_ns - self.end_ns) * 1e-9
+        ahead = (time_ns - self.end_ns) * 1e-9 + self._ahead_s
         place = (ahead % self.period_s) / GRID_S
         i = min(int(place), len(self._memory) - 2)
         now = self._memory[i] + (place - i) * (self._memory[i + 1] - self._memory[i])
-        result: Array = now + self._gap * max(0.0, 1.0 - ahead / self.period_s)
+        result: Array = now + self._gap * min(max(0.0, 1.0 - ahead / self.period_s), 1.0)
         return result
+
+    def keep_time(self, time_ns: int, heard: Sequence[tuple[slice, Array]]) -> None:
+        """Go a little faster or slower, so that some joints are where they are told to be at a
+        stamp: those of legs that still send targets, positions [rad] and velocities [rad/s],
+        (2, 3) each.
+        """
+        dt, self._kept_ns = (time_ns - self._kept_ns) * 1e-9, time_ns
+        position, pull, power = self.at(time_ns)[0], 0.0, STEADY * STEADY
+        for of, (told, velocity) in heard:
+            pull += float(velocity @ (told - position[of]))
+            power += float(velocity @ velocity)
+        self._ahead_s += dt * min(max(pull / (KEEPING_S * power), -KEEPS), KEEPS)
+
+
+def _unbroken_since(heard: deque[tuple[int, Array]], begin_ns: int) -> int:
+    """Stamp since which a leg has sent without a gap; it need not be looked for before a time."""
+    since_ns = heard[-1][0]
+    for stamp_ns, _ in reversed(heard):
+        if since_ns - stamp_ns > GAP_NS:
+            break
+        since_ns = stamp_ns
+        if stamp_ns <= begin_ns:
+            break
+    return since_ns
 
 
 def _since(heard: deque[tuple[int, Array]], begin_ns: int) -> list[tuple[int, Array]]:

@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Command watchdog: the newest joint targets, or a safe stop when a leg sends none.
 
-A walking robot goes on with the rhythm of its last cycle, in steps that become smaller until it
-stands; without a rhythm it holds its joints for 0.1 s and puts its feet down. A standing robot
-holds its stance. One that is upright but low (on its way up or down, or on its belly) is lowered
-onto its belly. So is one with a lame leg, which gives no torque or anything, as fast as it would
-fall: three legs do not carry a body that moves, and from its belly nothing falls. The joints of a
-tilted one are damped. Targets are followed again when they rest where the joints are, or a step
-away where the robot stands, and act in time.
+A walking robot goes on with the rhythm of its last cycle, first the leg that sends none, then all,
+in steps that become smaller until it stands; without a rhythm it holds its joints for 0.1 s and
+puts its feet down. A standing robot holds its stance. One that is upright but low (on its way up
+or down, or on its belly) is lowered onto its belly. So is one with a lame leg, which gives no
+torque or anything, as fast as it would fall: three legs do not carry a body that moves, and from
+its belly nothing falls. The joints of a tilted one are damped. Targets are followed again when
+they rest where the joints are, or a step away where the robot stands, and act in time.
 """
 
 from __future__ import annotations
@@ -20,25 +20,17 @@ from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.modes.falls import BodySense, FallParameters
 from dmp_cpg_ros.core.modes.motion_library import RISE, lying_posture, time_unit
-from dmp_cpg_ros.core.primitives.demonstration import minimum_jerk
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets, RobotState
+from dmp_cpg_ros.robot.absent_legs import CARRIED_NS, TAKEN_UP_S, AbsentLegs, share
 from dmp_cpg_ros.robot.drive_watch import DriveWatch
 from dmp_cpg_ros.robot.last_cycle import LastCycle, Rhythm
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 from dmp_cpg_ros.robot.target_loss import BORNE, LITTLE, TargetLoss
 from dmp_cpg_ros.robot.target_watch import TargetWatch
 
-CARRIED_NS = 24_000_000
-"""Age up to which late targets are carried on by their own velocity [ns]."""
-
 HELD_NS = 100_000_000
 """Age up to which late targets are held that have no rhythm with which to go on [ns]."""
-
-IN_TIME_NS = 60_000_000
-"""Time for which targets must have been in time again until they are followed again [ns]: those
-that come now and then only tell what was, and to follow them each time tears at the feet.
-"""
 
 LATE_NS = 1_000_000_000
 """Time for which targets may be late again and again until the robot looks after itself [ns]."""
@@ -60,12 +52,6 @@ LONGEST_STOP_S = 1.6
 NEAR, SLOW = 0.3, 0.3
 """Distance [rad] and speed [rad/s] within which targets are at rest where the joints are held."""
 
-APART, AHEAD_S = 0.2, 0.1
-"""How far legs that come back to a robot in motion may be from its rhythm [rad], and in how much
-time they must not be three times as far [s]: feet touch down a little earlier or later. Those that
-had not been away were so by 0.10 rad and 0.43 rad at most, a robot's stance by 0.38 and 0.72 rad.
-"""
-
 STEPPED = 0.7
 """That distance for a robot that stands: its legs may rest on footholds a step away [rad]."""
 
@@ -77,11 +63,6 @@ robot that starts to walk has no rhythm yet with which to go on when they are la
 
 AGAIN_NS = 10_000_000_000
 """Time since it looked after itself from which on it is as for the first time [ns]."""
-
-TAKEN_UP_S = 0.3
-"""Time in which the joints go over to targets that are followed again, as long for each ``NEAR``
-by which they are away [s].
-"""
 
 YIELDS = 0.15
 """Share of its torque limits with which a leg moves that was cut off, until the legs are followed
@@ -102,8 +83,8 @@ class CommandWatchdog:
     that varies within the lead becomes a constant one. Those that act later are carried on by
     their own velocity to the time at which they act, as the joint would have moved if they had
     come in time; otherwise every late message would hold the feet, and with them the body, back.
-    When a leg's targets are still later, all legs go on with the rhythm of their last cycle or
-    take up their stance.
+    A leg whose targets are still later goes on with the rhythm of the last cycle, and when it does
+    not come back the robot takes up its stance.
 
     Parameters
     ----------
@@ -153,15 +134,14 @@ class CommandWatchdog:
         self.drives = DriveWatch(description)
         self._tilt = FallParameters().fall_tilt
         self._memory = LastCycle()
-        self._rhythm: Rhythm | None = None
+        self._absent = AbsentLegs(self._memory, timeout_ns + return_ns)
         self._given, self._off = np.zeros(12), np.zeros(12)
-        self._begin_ns = self._late_ns = self._uneasy_ns = self._taken_ns = 0
+        self._begin_ns = self._uneasy_ns = 0
         self._ease_ns, self._alone_ns = AT_EASE_NS, -AGAIN_NS
-        self._taking_s, self._stop_s = TAKEN_UP_S, 0.0
+        self._stop_s = 0.0
         self._cut: set[str] = set()  # legs that are or were cut off since it looks after itself
         limit = np.concatenate([leg.torque_limit for leg in description.legs])
         self._yields = YIELDS * limit / np.maximum(np.tile(description.kp, 4), 1e-9)  # [rad]
-        self._lagged_ns = -1
         self.lateness_ns = self.ticks = self.carried = 0
         self._start = self._targets
 
@@ -180,8 +160,9 @@ class CommandWatchdog:
         """Legs whose targets are missing or too old; all, where they are late all the time, or
         too many are lost.
         """
-        more_ns = self._return_ns if self._late_ns and self._rhythm else 0
-        late = 0 < self._late_ns < now_ns - LATE_NS - more_ns
+        since_ns = self._absent.since_ns
+        more_ns = self._return_ns if since_ns and self._absent.rhythm else 0
+        late = 0 < since_ns < now_ns - LATE_NS - more_ns
         return list(LEGS) if late or self._losing else self.unheard(now_ns, more_ns)
 
     def unheard(self, now_ns: int, more_ns: int = 0) -> list[str]:
@@ -253,49 +234,33 @@ class CommandWatchdog:
         self.lateness_ns = max(ages, default=0)
         if known:
             self.ticks, self.carried = self.ticks + 1, self.carried + (self.lateness_ns > 0)
-        if self.lateness_ns > CARRIED_NS:
-            self._lagged_ns = now
+        if not self.fallback and self.lateness_ns > CARRIED_NS:
+            self._absent.watch(now, ages)
         self._losing = self.lost > (LITTLE if self._losing else BORNE)
         if self.drives.lame or self.silent(now) or self._astray() or (
                 self.fallback and known and not self._at_ease(now)):
             return self._falling_back(state)
         if self.fallback:
-            self._taken_ns, self.fallback = now, ''
-            self._off = self._given - self._targets[0]
-            self._taking_s = TAKEN_UP_S * max(1.0, float(np.abs(self._off).max()) / NEAR)
-        position, velocity, effort = self._targets.copy()
+            self.fallback, off = '', self._given - self._targets[0]
+            self._absent.take_up(
+                now, off, TAKEN_UP_S * max(1.0, float(np.abs(off).max()) / NEAR))
+        targets = self._targets.copy()
         if any(ages):
             late = np.repeat(ages, len(JOINTS_OF_LEG))
-            position += 1e-9 * np.clip(late, 0, CARRIED_NS) * velocity
-        if self._lagged_ns >= now - (IN_TIME_NS if self._late_ns else 0):
-            return JointTargets(*self._going_on(now, np.array((position, velocity, effort))))
-        if self._late_ns and self._elsewhere(now, position, velocity):
-            if now - self._late_ns > self._timeout_ns + self._return_ns:
-                return self._falling_back(state)
-            return JointTargets(*self._going_on(now, np.array((position, velocity, effort))))
-        if self._late_ns:
-            self._late_ns, self._taken_ns, self._off = 0, now, self._given - position
-            self._taking_s = TAKEN_UP_S
-        if self._taken_ns and now - self._taken_ns < self._taking_s * 1e9:
-            position += (1.0 - _share(now - self._taken_ns, self._taking_s)) * self._off
-        else:
+            targets[0] += 1e-9 * np.clip(late, 0, CARRIED_NS) * targets[1]
+        if self._absent.since_ns and not self._absent.go_on(now, targets, self._given):
+            return self._falling_back(state)
+        if not self._absent.taking_up(now, targets[0]) and not self._absent.since_ns:
             self.leaving = ''
-        return JointTargets(position, velocity, effort)
+        return JointTargets(*targets)
 
     def _astray(self) -> bool:
         """Whether moving legs are late that have no rhythm with which to go on: a robot that took
         up a stand until they are in time again would be torn out of it into their stride.
         """
-        return bool(self._late_ns and self._rhythm is None and self.lateness_ns > HELD_NS
+        absent = self._absent
+        return bool(absent.since_ns and absent.rhythm is None and self.lateness_ns > HELD_NS
                     and np.abs(self._targets[1]).max() > SLOW)
-
-    def _elsewhere(self, now: int, position: Array, velocity: Array) -> bool:
-        """Whether legs that have come back are, or are about to be, elsewhere in the gait than the
-        robot, which would be torn out of its stride.
-        """
-        rhythm = self._going_on(now, np.array((position, velocity, velocity)))
-        off, rate = position - rhythm[0], velocity - rhythm[1]
-        return bool(np.abs(off).max() > APART or np.abs(off + AHEAD_S * rate).max() > 3.0 * APART)
 
     def _take_what_acts(self, now: int) -> list[int]:
         """Take of each leg the newest targets whose time has come; return their ages [ns]."""
@@ -308,14 +273,6 @@ class CommandWatchdog:
                 ages.append(now - holds_ns)
         return ages
 
-    def _going_on(self, now: int, last: Array) -> Array:
-        """Targets (3, 12) while a leg is late, but not yet silent, after the last ones. All legs
-        go on together: those that are in time know nothing of the one that is not.
-        """
-        if not self._late_ns:
-            self._late_ns, self._rhythm = now, self._memory.rhythm()
-        return last if self._rhythm is None else self._rhythm.at(now)
-
     def _stands(self, state: RobotState) -> bool:
         condition = self._sense.condition(state)
         return (condition.tilt <= self._tilt
@@ -327,7 +284,7 @@ class CommandWatchdog:
         """
         position, velocity, _ = self._targets
         near = STEPPED if self.fallback == 'stand' else NEAR
-        stopping = self._rhythm is not None and now - self._begin_ns < 1e9 * self._stop_s
+        stopping = self._absent.rhythm is not None and now - self._begin_ns < 1e9 * self._stop_s
         if (stopping or np.abs(velocity).max() > SLOW or self.lateness_ns > CARRIED_NS
                 or np.abs(position - self._given).max() > near):
             self._uneasy_ns = now
@@ -350,8 +307,8 @@ class CommandWatchdog:
             self._uneasy_ns = now
         if self.fallback == 'damp':
             return JointTargets(state.joint_position.copy(), np.zeros(12), np.zeros(12))
-        if self.fallback == 'stand' and self._rhythm is not None:
-            return self._coming_to_a_stand(self._rhythm, state)
+        if self.fallback == 'stand' and self._absent.rhythm is not None:
+            return self._coming_to_a_stand(self._absent.rhythm, state)
         return JointTargets(*self._taking_up(self._way, now - self._begin_ns, state))
 
     def _begin_falling_back(self, state: RobotState) -> None:
@@ -361,38 +318,34 @@ class CommandWatchdog:
         self._way = 'drop' if lame else self.fallback
         known = None not in self.stamps
         start = np.array((self._given if known else state.joint_position, *np.zeros((2, 12))))
-        if known and not self._late_ns and not lame:
-            self._going_on(now, start)
+        if known and not self._absent.since_ns and not lame:
+            self._absent.look()
+        self._absent.all_here()
         self._begin_ns = self._uneasy_ns = now
-        self._late_ns, self._start = 0, start
-        if self._rhythm is not None:
-            self._stop_s = min(STOP_CYCLES * self._rhythm.period_s, LONGEST_STOP_S)
-        self._off = self._given - self._rhythm.at(now)[0] if self._rhythm else np.zeros(12)
+        self._start, rhythm = start, self._absent.rhythm
+        if rhythm is not None:
+            self._stop_s = min(STOP_CYCLES * rhythm.period_s, LONGEST_STOP_S)
+        self._off = self._given - rhythm.at(now)[0] if rhythm else np.zeros(12)
 
     def _taking_up(self, posture: str, ahead_ns: int, state: RobotState) -> Array:
         """Targets (3, 12) on the way to a posture; a standing robot carries its weight."""
         goal, seconds = self._ways[posture]
-        share, rate = _share(ahead_ns, seconds), _share(ahead_ns, seconds, 1) / seconds
-        left, away = (1.0 - share) * self._start, goal - self._start[0]
-        left[0] += share * goal
+        done, rate = share(ahead_ns, seconds), share(ahead_ns, seconds, 1) / seconds
+        left, away = (1.0 - done) * self._start, goal - self._start[0]
+        left[0] += done * goal
         left[1] += rate * away
         if posture == 'stand':
-            left[2] += self._sense.carrying_torque(state, share)
+            left[2] += self._sense.carrying_torque(state, done)
         return left
 
     def _coming_to_a_stand(self, rhythm: Rhythm, state: RobotState) -> JointTargets:
         """The last rhythm about the stance, smaller and smaller."""
         now, goal = state.time_ns, self._ways['stand'][0]
         seconds, ahead = self._stop_s, now - self._begin_ns
-        size, rate = 1.0 - _share(ahead, seconds), -_share(ahead, seconds, 1) / seconds
+        size, rate = 1.0 - share(ahead, seconds), -share(ahead, seconds, 1) / seconds
         position, velocity, effort = rhythm.at(now)
-        away = position + (1.0 - _share(ahead, TAKEN_UP_S)) * self._off - goal
+        away = position + (1.0 - share(ahead, TAKEN_UP_S)) * self._off - goal
         carried = self._sense.carrying_torque(state, 1.0 - size)
         return JointTargets(
             goal + size * away, size * velocity + rate * away, size * effort + carried)
 
-
-def _share(time_ns: int, seconds: float, order: int = 0) -> float:
-    """Share of a movement of least jerk that is done after a time [ns], or its derivative."""
-    s = min(max(time_ns * 1e-9 / seconds, 0.0), 1.0)
-    return 30.0 * (s * (1.0 - s)) ** 2 if order else float(minimum_jerk(np.array(s)))

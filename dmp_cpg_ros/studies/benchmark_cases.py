@@ -148,6 +148,9 @@ STARVED = (Stalls(300.0, 150.0), Stalls(150.0, 200.0),
 STARVED_WALKS = (('amble', 0.5), ('trot', 1.0))
 """Gaits and speeds of those."""
 
+BACK_WITHIN = (0.3, 0.6, 1.1)
+"""Times within which legs that die in those gaits are back [s]."""
+
 WEAK = 0.4
 """Share of its torque that a weak drive has."""
 

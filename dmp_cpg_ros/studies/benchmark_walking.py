@@ -10,13 +10,12 @@ seeds that cross 5 m of rough ground; rougher, higher: of harder grounds, and of
 with longer legs. obstacles: steps that are too high. contacts: rough ground with and without the
 feedback of touchdown and the stumbling reflex. climbing: stairs without and with what all legs
 share of one foot's step. delays: targets that arrive late; slow_rates: also where a tick is long.
-starved: those of controllers that do not get to run. mismatch: a robot that is not as its
-controllers know it.
-gaits: every ordered pair of gaits changed while moving; fast_gaits: at the highest speeds,
-forwards and backwards, of other robots too; returns: while they are told to go back, and stopped.
-restarts: posture control that forgets all in the
-middle of a stride, as a node that is started again. robots: other robots, with their files alone;
-those of the extra `robots` are left out where it is not installed.
+starved: those of controllers that do not get to run; killed_legs: of legs that die and are started
+again. mismatch: a robot that is not as its controllers know it. gaits: every ordered pair of gaits
+changed while moving; fast_gaits: at the highest speeds, forwards and backwards, of other robots
+too; returns: while they are told to go back, and stopped. restarts: posture control that forgets
+all in the middle of a stride, as a node that is started again. robots: other robots, with their
+files alone; those of the extra `robots` are left out where it is not installed.
 
 The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
 """
@@ -147,6 +146,23 @@ def starved(workers: Workers, seeds: int, phases: int) -> Table:
                      f'{np.mean([one.stood for one in of]):.1f}'))
     return Table('Controllers that starve', (
         'gait, m/s', 'stalls', 'fell', 'looked after itself, per walk'), rows, results)
+
+
+def killed_legs(workers: Workers, seeds: int, phases: int) -> Table:
+    """Falls by how soon legs that die are back."""
+    cells = list(product(given.STARVED_WALKS, given.BACK_WITHIN))
+    results = run(workers, late_walks.killed, [
+        {'gait': gait, 'speed': speed, 'longest_s': longest_s, 'seed': seed + 1}
+        for (gait, speed), longest_s in cells for seed in range(seeds)])
+    rows = []
+    for ((gait, speed), longest_s), of in by_cell(cells, results):
+        tilts = [one.tilt for one in of]
+        rows.append((f'{gait} {speed:g}', f'{longest_s:g}', str(sum(one.kills for one in of)),
+                     str(sum(one.stood for one in of)), f'{sum(one.fell for one in of)}/{seeds}',
+                     f'{np.median(tilts):.2f} / {max(tilts):.2f}'))
+    return Table('Legs that die and are started again', (
+        'gait, m/s', 'back within s', 'deaths', 'looked after itself', 'fell',
+        'largest tilt rad, median / worst'), rows, results)
 
 
 def mismatch(workers: Workers, seeds: int, phases: int) -> Table:
@@ -312,8 +328,8 @@ def robots(workers: Workers, seeds: int, phases: int) -> Table:
 TABLES = {make.__name__: make for make in (
     speeds, benchmark_pushes.pushes, benchmark_pushes.timing, benchmark_pushes.manoeuvres,
     benchmark_pushes.unpushed, grounds.rough, grounds.rougher, grounds.higher, grounds.obstacles,
-    grounds.contacts, grounds.climbing, delays, slow_rates, starved, mismatch, gaits, fast_gaits,
-    returns, restarts, robots)}
+    grounds.contacts, grounds.climbing, delays, slow_rates, starved, killed_legs, mismatch, gaits,
+    fast_gaits, returns, restarts, robots)}
 """What can be measured."""
 
 

@@ -1,6 +1,7 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Walks whose targets arrive late: after a delay, or in bursts from controllers that starve.
+"""Walks whose targets arrive late: after a delay, in bursts from controllers that starve, or, from
+legs that die and are started again, not at all.
 
 In the plain loop with the robot's command watchdog between the legs and the robot.
 """
@@ -17,7 +18,8 @@ from dmp_cpg_ros.core.loop import Tick
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.suite_parameters import RobotParameters, TickParameters
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
-from dmp_cpg_ros.studies.walking_trials import Walk, attitude
+from dmp_cpg_ros.studies.walking_trials import STANDING, Walk, attitude
+from dmp_cpg_ros.suite_table import RETURN_S
 
 LATE_S = 6.0
 """Time for which a robot whose targets arrive late is watched at its speed [s]."""
@@ -49,6 +51,8 @@ class LateWalk(Walk):
         ``control_rate`` [Hz].
     """
 
+    return_ns = 0
+
     def __init__(self, gait: str, delay_ms: tuple[float, float], lead_ms: int, seed: int,
                  rate: float = TickParameters.control_rate) -> None:
         self._delay_ms, self._lead_ms = delay_ms, lead_ms
@@ -62,8 +66,8 @@ class LateWalk(Walk):
     def acting(self, tick: Tick) -> JointTargets:
         """Send what the legs want, and take of it what the robot's watchdog gives out."""
         if self._guard is None:
-            self._guard = CommandWatchdog(
-                self.robot.description, TARGET_TIMEOUT_NS, self._lead_ms * 1_000_000)
+            self._guard = CommandWatchdog(self.robot.description, TARGET_TIMEOUT_NS,
+                                          self._lead_ms * 1_000_000, return_ns=self.return_ns)
         for i, (leg, of_leg) in enumerate(tick.targets.by_leg().items()):
             queue, at_ns = self._on_the_way[i], self.arrives_ns(
                 i, tick.time_ns, self._guard.stamps[i] is None)
@@ -201,3 +205,65 @@ def starved(gait: str, speed: float, stalls: Stalls, seed: int) -> StarvedOutcom
     run = StarvedWalk(gait, stalls, seed)
     upright = run.settle((speed, 0.0, 0.0)) and run.walk(STARVED_S)
     return StarvedOutcome(not upright, run.stood)
+
+
+class KilledWalk(StarvedWalk):
+    """A walk whose legs die, one at a time, and are started again with what the others tell; the
+    first one while it starts.
+
+    Parameters
+    ----------
+    gait : str
+        Name of the gait.
+    seed : int
+        Of all draws and of the start.
+    longest_s : float
+        Within which time a leg is back [s].
+
+    Attributes
+    ----------
+    kills : int
+        How many have died.
+    """
+
+    return_ns = round(1e9 * RETURN_S)
+
+    def __init__(self, gait: str, seed: int, longest_s: float) -> None:
+        self._fate, self._longest_s, self.kills = np.random.default_rng((seed, 2)), longest_s, 0
+        self._dead, self._until_it_lives_ns, self._dies_ns = -1, 0, round(
+            1e9 * (STANDING + self._fate.uniform(0.1, 1.5)))
+        super().__init__(gait, Stalls(0.0, 0.0), seed)
+        self._next_ns = [round(1e9 * (STANDING + STARVED_S)) + 1] * len(LEGS)  # no stalls
+
+    def acting(self, tick: Tick) -> JointTargets:
+        """As :class:`StarvedWalk`; some legs live, some do not."""
+        now_ns, draw = tick.time_ns, self._fate.uniform
+        if self._dead < 0 and now_ns >= self._dies_ns:
+            self._dead, self.kills = int(self._fate.integers(len(LEGS))), self.kills + 1
+            self._until_it_lives_ns = now_ns + round(1e9 * self._longest_s * draw(0.03, 1.0))
+        elif self._dead >= 0 and now_ns >= self._until_it_lives_ns:
+            self.loop.leg_states[self._dead] = self.loop.legs[self._dead].picked_up(
+                tick.gait, tick.x, tick.x_dot, tick.r, tick.feedback)
+            self._dead, self._dies_ns = -1, now_ns + round(1e9 * draw(0.3, 3.0))
+        return super().acting(tick)
+
+    def arrives_ns(self, i: int, now_ns: int, first: bool) -> int | None:
+        """When what a leg sends now arrives [ns]; None: never."""
+        return None if i == self._dead else super().arrives_ns(i, now_ns, first)
+
+
+@dataclass(frozen=True)
+class KilledOutcome(StarvedOutcome):
+    """The same of a walk whose legs died, how many did, and its largest tilt [rad]."""
+
+    kills: int
+    tilt: float
+
+
+def killed(gait: str, speed: float, seed: int, longest_s: float) -> KilledOutcome:
+    """Start to walk at a speed [m/s], and go on for ``STARVED_S``; see :class:`KilledWalk`."""
+    run = KilledWalk(gait, seed, longest_s)
+    run.loop.command(speed)
+    upright = run.walk(STARVED_S)
+    tilt = float(np.abs(attitude(run.states)[:, :2]).max())
+    return KilledOutcome(not upright, run.stood, run.kills, tilt)

@@ -37,6 +37,7 @@ from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.modes.falls import FALLEN_TILT
+from dmp_cpg_ros.core.suite_parameters import TickParameters
 from dmp_cpg_ros.studies.link_watch import posture
 from dmp_cpg_ros.studies.output import folder_of_logs, markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.walk_process import WITHIN_S, WalkProcess, ahead
@@ -112,6 +113,8 @@ class Outcome:
         Whether it was ever tilted as if fallen.
     kills : list of Kill
         In order.
+    rate_hz : float
+        Control rate [Hz].
     """
 
     gait: str
@@ -121,16 +124,18 @@ class Outcome:
     end: str = 'unknown'
     fell: bool = False
     kills: list[Kill] = field(default_factory=list)
+    rate_hz: float = TickParameters.control_rate
 
 
 def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence[str],
-        rng: random.Random, folder: Path, tell: Callable[[str], None] = lambda _: None) -> Outcome:
+        rng: random.Random, folder: Path, tell: Callable[[str], None] = lambda _: None,
+        rate_hz: float = TickParameters.control_rate) -> Outcome:
     """Walk, and kill some nodes one after the other; says how far it is."""
     way = gait + ', lock-step' * lock_step
     tell(f'{way}: starts')
     walk = WalkProcess.of(folder, 3600.0, ahead(speed), *['--lock-step'] * lock_step,
-                          *['--respawn'] * respawn, gait=gait)
-    outcome = Outcome(gait, lock_step, respawn)
+                          *['--respawn'] * respawn, '--rate', f'{rate_hz:g}', gait=gait)
+    outcome = Outcome(gait, lock_step, respawn, rate_hz=rate_hz)
     going = walk.said('walking') < inf
     for number, node in enumerate(nodes if going else ()):
         tell(f'{way}: {number} of {len(nodes)} kills')
@@ -210,15 +215,18 @@ def _judge(outcome: Outcome, speed: float, folder: Path) -> None:
 
 def rows(outcomes: Sequence[Outcome]) -> Iterator[list[str]]:
     """Row of the table for each way to walk."""
-    ways = dict.fromkeys((one.gait, one.lock_step, one.respawn) for one in outcomes)
-    for way in ways:
-        own = [one for one in outcomes if (one.gait, one.lock_step, one.respawn) == way]
+    def way_of(one: Outcome) -> tuple[str, bool, bool, float]:
+        return one.gait, one.lock_step, one.respawn, one.rate_hz
+
+    for way in dict.fromkeys(map(way_of, outcomes)):
+        own = [one for one in outcomes if way_of(one) == way]
         kills, ends = [kill for one in own for kill in one.kills], [one.end for one in own]
         again = [kill for kill in kills if kill.in_phase_s < inf]
         fast = [kill for kill in kills if kill.as_fast_s < inf]
         seconds = [kill.as_fast_s - kill.time_s for kill in fast]
         bags = [kill for kill in kills if kill.unrecorded_s == kill.unrecorded_s]
-        yield [way[0], 'lock-step' if way[1] else 'real', 'yes' if way[2] else 'no',
+        slower = f', {way[3]:g} Hz' if way[3] != TickParameters.control_rate else ''
+        yield [way[0], ('lock-step' if way[1] else 'real') + slower, 'yes' if way[2] else 'no',
                str(len(own)), str(len(kills)), str(sum(one.fell for one in own)),
                f'{len(again)} of {len(kills)}' if way[2] else '',
                _spread([kill.cycles(kill.in_phase_s) for kill in again]),
@@ -254,7 +262,8 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
                     with folder_of_logs(options.logs and (
                             options.logs / f'{len(outcomes):03}_{gait}')) as folder:
                         outcomes.append(run(
-                            gait, speed, lock_step, respawn, wanted, rng, folder, tell))
+                            gait, speed, lock_step, respawn, wanted, rng, folder, tell,
+                            options.rate))
                     print(f'round {round_}: {json.dumps(asdict(outcomes[-1]))}', flush=True)
                     write_results(options.json, [asdict(one) for one in outcomes])
     print(markdown_table(COLUMNS, list(rows(outcomes))))
@@ -271,6 +280,8 @@ def _parser() -> argparse.ArgumentParser:
     add('--nodes', nargs='+', choices=(*VICTIMS, RECORDER), default=VICTIMS,
         metavar='NODE', help=f'that are killed: {RECORDER}, or (default: all of them) '
         f'{", ".join(VICTIMS)}')
+    add('--rate', type=float, default=TickParameters.control_rate, metavar='HZ',
+        help='control rate, for a machine that is too slow for %(default)g Hz')
     add('--seed', type=int, default=0, help='of nodes and times (default: 0)')
     return parser
 

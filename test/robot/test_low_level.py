@@ -13,6 +13,7 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.modes.motion_library import lying_posture
 from dmp_cpg_ros.core.robot_model.state import JointTargets
+from dmp_cpg_ros.robot.absent_legs import CARRIED_NS
 from dmp_cpg_ros.robot.drive_watch import DriveWatch
 from dmp_cpg_ros.robot.low_level import (
     COMMANDED,
@@ -22,7 +23,6 @@ from dmp_cpg_ros.robot.low_level import (
     MotorCommand,
 )
 from dmp_cpg_ros.robot.model_reader import load_description
-from dmp_cpg_ros.robot.watchdog import CARRIED_NS
 from dmp_cpg_ros.suite import load_suite
 
 DESCRIPTION = load_description()

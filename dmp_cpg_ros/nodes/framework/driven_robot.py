@@ -20,9 +20,10 @@ from dmp_cpg_ros.nodes.framework.known_stop import KnownStop
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.joint_targets import DRIVE_MODES, JointTargetsReader
 from dmp_cpg_ros.nodes.messages.values import header_ns
+from dmp_cpg_ros.robot.absent_legs import CARRIED_NS
 from dmp_cpg_ros.robot.drive_watch import DriveWatch
 from dmp_cpg_ros.robot.target_loss import BORNE
-from dmp_cpg_ros.robot.watchdog import CARRIED_NS, CommandWatchdog
+from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 
 INCIDENT_NS = 1_000_000_000
 """Time that all legs must have been heard for until their silence counts as over [ns]."""

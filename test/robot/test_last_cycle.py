@@ -1,0 +1,76 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The rhythm of the last cycle keeps time with the legs that are heard."""
+
+from __future__ import annotations
+
+from math import tau
+
+import numpy as np
+import pytest
+
+from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
+from dmp_cpg_ros.robot.absent_legs import CARRIED_NS, IN_TIME_NS, JOINTS, AbsentLegs
+from dmp_cpg_ros.robot.last_cycle import LastCycle
+
+TICK_NS, DEAD = 4_000_000, 0
+PERIOD_S = 0.42
+
+
+class Legs:
+    """Legs that move to and fro, at a rate that may change."""
+
+    def __init__(self) -> None:
+        random = np.random.default_rng(3)
+        self._size, self._lag = random.uniform(0.1, 0.4, 12), random.uniform(0.0, tau, 12)
+        self.now = TICK_NS
+        self._phase = 0.0
+        self.memory = LastCycle()
+        self.absent = AbsentLegs(self.memory, 1_000_000_000)
+        self._heard_ns, self.given = [0] * len(LEGS), np.zeros(12)
+
+    def step(self, faster: float = 1.0, dead: bool = False) -> tuple[Array, Array]:
+        """One tick; returns positions (12,) that are given out, and where the legs are."""
+        self.now += TICK_NS
+        rate = faster * tau / PERIOD_S
+        self._phase += rate * TICK_NS * 1e-9
+        wanted = np.array((self._size * np.sin(self._phase + self._lag),
+                           rate * self._size * np.cos(self._phase + self._lag), np.zeros(12)))
+        for i, of in enumerate(JOINTS):
+            if not (dead and i == DEAD):
+                self.memory.accept(i, self.now, JointTargets(*wanted[:, of]))
+                self._heard_ns[i] = self.now
+        ages = [self.now - heard_ns for heard_ns in self._heard_ns]
+        targets = wanted.copy()
+        targets[:, JOINTS[DEAD]] = self.memory.acting(DEAD, self.now)[1]
+        if max(ages) > CARRIED_NS:
+            self.absent.watch(self.now, ages)
+        if self.absent.since_ns:
+            assert self.absent.go_on(self.now, targets, self.given)
+        self.absent.taking_up(self.now, targets[0])
+        self.given = targets[0].copy()
+        return targets[0], wanted[0]
+
+
+@pytest.mark.parametrize('faster', [0.85, 1.0, 1.15])
+def test_a_leg_that_is_away_goes_on_in_time_with_the_others(faster: float) -> None:
+    """Its rhythm alone would be off by a third of a cycle after 0.8 s."""
+    legs = Legs()
+    for _ in range(500):
+        legs.step()
+    most = 0.0
+    for tick in range(200):
+        given, wanted = legs.step(faster, dead=True)
+        live = np.ones(12, dtype=bool)
+        live[JOINTS[DEAD]] = False
+        assert np.array_equal(given[live], wanted[live])
+        if tick > 80:
+            most = max(most, float(np.abs(given - wanted).max()))
+    assert most < 0.06 if faster == 1.0 else most < 0.12
+    for tick in range(100):
+        before = legs.given
+        given, wanted = legs.step(faster)
+        assert np.abs(given - before).max() < 1.5 * 0.4 * faster * tau / PERIOD_S * TICK_NS * 1e-9
+        assert bool(legs.absent.since_ns) == ((tick + 1) * TICK_NS <= IN_TIME_NS)
+    assert np.allclose(given, wanted)
