@@ -2,10 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Legs whose targets act too late: how they go on meanwhile, and how they are followed again.
 
-A leg that is late goes on with its part of the rhythm of the last cycle, while those that are in
-time are followed: they feel the body, and keep it up. The rhythm keeps time with them, as its
-period is only what the memory says of it. A leg that is back is followed once it is where the
-rhythm is, and the joints go over to it.
+A leg that is late alone goes on with its part of the rhythm of the last cycle, while those that
+are in time are followed: they feel the body, and keep it up. The rhythm keeps time with them, as
+its period is only what the memory says of it. Where several are late all go on with it. A leg that
+is back is followed once it is where the rhythm is, and the joints go over to it.
 """
 
 from __future__ import annotations
@@ -80,9 +80,12 @@ class AbsentLegs:
         self.rhythm = self._memory.rhythm()
 
     def watch(self, now: int, ages: list[int]) -> None:
-        """Note who is late, by the ages of the legs' targets [ns]."""
-        for i, age in enumerate(ages):
-            if age > CARRIED_NS:
+        """Note who is late, by the ages of the legs' targets [ns]; two, whose controllers starve,
+        take the others with them: what these do for two that are elsewhere throws a trot over.
+        """
+        late = [age > CARRIED_NS for age in ages]
+        for i, so in enumerate(late):
+            if so or sum(late) > 1:
                 if not self.since_ns:
                     self.look()
                 self._late_ns[i] = now
