@@ -74,3 +74,33 @@ def test_a_leg_that_is_away_goes_on_in_time_with_the_others(faster: float) -> No
         assert np.abs(given - before).max() < 1.5 * 0.4 * faster * tau / PERIOD_S * TICK_NS * 1e-9
         assert bool(legs.absent.since_ns) == ((tick + 1) * TICK_NS <= IN_TIME_NS)
     assert np.allclose(given, wanted)
+
+
+def remembered(position: Array) -> LastCycle:
+    """Memory of positions (n, 12), one for each tick."""
+    memory, rates = LastCycle(), np.gradient(position, TICK_NS * 1e-9, axis=0)
+    for tick, (q, q_dot) in enumerate(zip(position, rates, strict=True), 1):
+        for i, of in enumerate(JOINTS):
+            memory.accept(i, tick * TICK_NS, JointTargets(q[of], q_dot[of], np.zeros(3)))
+    return memory
+
+
+def smooth(seed: int, count: int) -> Array:
+    """Motion of 12 joints, (count, 12), that never repeats itself."""
+    drawn = np.random.default_rng(seed).normal(size=(count + 50, 12))
+    return np.stack([np.convolve(column, np.hanning(52)[1:-1], 'same')[25:-25]
+                     for column in drawn.T], axis=1)
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_a_gait_that_balances_has_its_rhythm_and_what_resembles_its_end_by_chance_has_none(
+        seed: int) -> None:
+    count, period = 425, round(PERIOD_S / (TICK_NS * 1e-9))
+    turns, lag = np.arange(count)[:, None] / period, np.random.default_rng(seed).uniform(size=12)
+    gait, other = np.sin(tau * (turns + lag)), smooth(seed, count)
+    rhythm = remembered(gait + 0.18 * other / other.std()).rhythm()
+    assert rhythm is not None
+    assert rhythm.period_s / PERIOD_S == pytest.approx(round(rhythm.period_s / PERIOD_S), abs=0.05)
+    again, apart = 25, 176
+    other[-again - 1:] = other[-again - 1 - apart:-apart]
+    assert remembered(other).rhythm() is None
