@@ -9,6 +9,9 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import gc
+import os
+from collections.abc import Sequence
+from pathlib import Path
 
 _PR_SET_PDEATHSIG, _PR_SET_NAME, _PR_SET_CHILD_SUBREAPER = 1, 15, 36
 """Options of prctl(2)."""
@@ -33,6 +36,16 @@ def adopt_orphans() -> None:
 def show_name(name: str) -> None:
     """Let ``ps`` and ``top`` show a name, or its first 15 bytes. Linux only."""
     _prctl(_PR_SET_NAME, name.encode()[:15])
+
+
+def show_command(words: Sequence[str]) -> None:
+    """Let ``ps`` show a command line, as far as there is room, in the place of this program's."""
+    with contextlib.suppress(OSError, ValueError):
+        status = Path('/proc/self/stat').read_text(encoding='utf-8')
+        begin, end = map(int, status.rpartition(')')[2].split()[45:47])
+        if begin:
+            shown = b'\0'.join(map(os.fsencode, words))[:end - begin - 1]
+            ctypes.memmove(begin, shown.ljust(end - begin, b'\0'), end - begin)
 
 
 def _prctl(option: int, value: int | bytes) -> None:

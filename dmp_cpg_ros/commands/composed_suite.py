@@ -25,21 +25,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery
     from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 
+    classes = {kind.name: getattr(import_module(kind.module), kind.class_name)
+               for kind in WALKING if set(chosen) & set(kind.instances)}
+
     def make() -> Iterator[SuiteNode]:
         # A kind with nodes elsewhere, too, is not in this process: its readers hear all of it.
         local = LocalDelivery(
             [kind.name for kind in WALKING if set(kind.instances) <= set(chosen)])
         for kind in WALKING:
-            node_class = getattr(import_module(kind.module), kind.class_name)
             for name in filter(chosen.__contains__, kind.instances):
                 try:
-                    node = node_class(name)
+                    node = classes[kind.name](name)
                 except ParameterError as error:
                     raise ParameterError(f'{name}: {error}') from error
                 node.local = local
                 yield node
 
-    return run_nodes('composed_suite', given[own:], make)
+    return run_nodes('composed_suite', given[own:], make,
+                     any(node_class.JUDGES for node_class in classes.values()))
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -179,7 +179,9 @@ class ForkServer:
 
 def _serve(parent: int, requests: socket.socket) -> None:
     """Fork for every request until there are no more; returns in what was forked, ready to run."""
-    _show([sys.executable, __file__, str(parent)])  # without the padding
+    from dmp_cpg_ros.process import show_command
+
+    show_command([sys.executable, __file__, str(parent)])  # without the padding
     while True:
         message, files, _, _ = socket.recv_fds(requests, MOST_BYTES, 2)
         if not message:
@@ -288,7 +290,7 @@ def _tell_tracer() -> None:
 def _become(parent: int, files: Sequence[int], command: Sequence[str],
             environment: Mapping[str, str]) -> None:
     """Be the process that was asked for: its session, files, environment, arguments, name."""
-    from dmp_cpg_ros.process import end_with_parent, show_name
+    from dmp_cpg_ros.process import end_with_parent, show_command, show_name
 
     os.setsid()
     for number, descriptor in enumerate(files, 1):
@@ -299,19 +301,9 @@ def _become(parent: int, files: Sequence[int], command: Sequence[str],
         os.kill(os.getpid(), signal.SIGTERM)
     os.environ.clear()
     os.environ.update(environment)
-    _show([sys.executable, __file__, str(parent), *command])
+    show_command([sys.executable, __file__, str(parent), *command])
     show_name(command[0])
     sys.argv = list(command)
-
-
-def _show(words: Sequence[str]) -> None:
-    """Let ``ps`` show a command line, as far as there is room, in the place of this program's."""
-    with contextlib.suppress(OSError, ValueError):
-        status = Path('/proc/self/stat').read_text(encoding='utf-8')
-        begin, end = map(int, status.rpartition(')')[2].split()[45:47])
-        if begin:
-            shown = b'\0'.join(map(os.fsencode, words))[:end - begin - 1]
-            ctypes.memmove(begin, shown.ljust(end - begin, b'\0'), end - begin)
 
 
 def main() -> int:

@@ -46,6 +46,7 @@ class CanonicalOscillators(SuiteNode):
     """Advances the four coupled oscillators with the robot's clock."""
 
     KIND = CANONICAL
+    JUDGES = True
     CHANGEABLE = JUDGED
     certified: Certified
 

@@ -65,6 +65,7 @@ class InhibitionNode(SuiteNode):
     """
 
     KIND = INHIBITION
+    JUDGES = True
     CHANGEABLE = (*JUDGED, *VOTE_SOURCES)
     certified: Certified
 

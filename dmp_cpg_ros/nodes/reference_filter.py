@@ -32,6 +32,7 @@ class ReferenceFilter(SuiteNode):
     """
 
     KIND = REFERENCE
+    JUDGES = True
     CHANGEABLE = JUDGED
     certified: Certified
 

@@ -33,6 +33,7 @@ from rclpy.utilities import get_default_context
 
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, MissingFileError, ParameterError
 from dmp_cpg_ros.nodes.framework.claims import claim
+from dmp_cpg_ros.nodes.framework.judging import judge
 from dmp_cpg_ros.nodes.framework.middleware import (
     cannot_start,
     prepare_middleware,
@@ -187,11 +188,12 @@ def run_node(kind: str) -> int:
     if {'-h', '--help'} & set(own):
         print(help_text(node_class))
         return OK
-    return run_nodes(kind, arguments, lambda: [node_class(node_class.default_name(arguments))])
+    return run_nodes(kind, arguments, lambda: [node_class(node_class.default_name(arguments))],
+                     node_class.JUDGES)
 
 
 def run_nodes(program: str, arguments: Sequence[str],
-              make: Callable[[], Iterable[SuiteNode]]) -> int:
+              make: Callable[[], Iterable[SuiteNode]], judging: bool) -> int:
     """Run nodes in one process and one executor, from ``rclpy.init`` to the exit status.
 
     Parameters
@@ -203,6 +205,8 @@ def run_nodes(program: str, arguments: Sequence[str],
     make : callable () → iterable of SuiteNode
         Makes the nodes; called after ``rclpy.init``. The first node's parameters ``executor`` and
         ``scheduling`` decide for all.
+    judging : bool
+        Whether one of them judges changes.
 
     Returns
     -------
@@ -210,6 +214,8 @@ def run_nodes(program: str, arguments: Sequence[str],
         As for :func:`run_node`.
     """
     nodes: list[SuiteNode] = []
+    if judging:
+        judge().fork()
     until = first_signal()
     status = _status(program, lambda: _run(program, arguments, make, nodes, until))
     for node in nodes:

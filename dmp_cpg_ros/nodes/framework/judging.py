@@ -4,8 +4,9 @@
 
 A verdict on a change of parameters takes several ticks. It is a function of values alone, so that
 another process can find it while the node goes on: threads of one interpreter would share its
-lock, and a tick would wait for it at every product of matrices. The process is started when it is
-first needed, yields to the nodes, and ends with the one that started it.
+lock, and a tick would wait for it at every product of matrices. The process is forked by one that
+runs nodes before there is anything of ROS in it, or else started when it is first needed; it
+yields to the nodes, and ends with the one that started it.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from collections.abc import Callable, Generator
 from functools import lru_cache, partial
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
-from dmp_cpg_ros.process import collect_seldom
+from dmp_cpg_ros.process import collect_seldom, show_command, show_name
 
 if TYPE_CHECKING:
     from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
@@ -40,6 +41,9 @@ Steps = Generator[Step, None, None]
 """What has to be computed, one after the other. What a computation or its use raises is raised in
 them."""
 
+NAME = 'judge'
+"""By which ``ps`` shows what was forked."""
+
 NICENESS = 10
 """How far the process yields to those with ticks."""
 
@@ -48,19 +52,67 @@ class JudgeError(Exception):
     """It could not be computed beside the ticks."""
 
 
+class Forked:
+    """A process that computes, forked from this one; as much of a :class:`subprocess.Popen` as is
+    needed.
+
+    Attributes
+    ----------
+    pid : int
+        Its number.
+    stdin, stdout : file
+        For questions and of answers.
+    """
+
+    def __init__(self) -> None:
+        """Fork it; what is forked does not return from here."""
+        questions, ask = os.pipe()
+        answers, answer = os.pipe()
+        self.pid = os.fork()
+        if not self.pid:
+            status = 1
+            try:
+                os.close(ask)
+                os.close(answers)
+                show_command([NAME])
+                show_name(NAME)
+                _serve(os.fdopen(questions, 'rb'), os.fdopen(answer, 'wb'))
+                status = 0
+            finally:
+                os._exit(status)  # the end of what it was forked from is not its own
+        os.close(questions)
+        os.close(answer)
+        self.stdin, self.stdout = os.fdopen(ask, 'wb'), os.fdopen(answers, 'rb')
+
+    def kill(self) -> None:
+        """End it at once."""
+        os.kill(self.pid, signal.SIGKILL)
+
+    def wait(self) -> None:
+        """Wait for its end."""
+        os.waitpid(self.pid, 0)
+
+
 class Judge:
     """A process that computes one thing after the other."""
 
     def __init__(self) -> None:
         """Start nothing yet."""
         self._asked: queue.SimpleQueue[tuple[Compute, Use]] = queue.SimpleQueue()
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: subprocess.Popen[bytes] | Forked | None = None
         self._thread: threading.Thread | None = None
 
     @property
     def pid(self) -> int | None:
         """Of the process; None while there is none."""
         return None if self._process is None else self._process.pid
+
+    def fork(self) -> None:
+        """Have the process from now on. Where it can be forked it is there in a moment, and has
+        imported all; but nothing of ROS may run yet, whose threads it would not have.
+        """
+        if self._process is None and hasattr(os, 'fork'):
+            self._process = Forked()
 
     def ask(self, compute: Compute, use: Use) -> None:
         """Have something computed.
@@ -97,7 +149,7 @@ class Judge:
                 self._process = None
             return JudgeError(f'{type(error).__name__}: {error}')
 
-    def _started(self) -> subprocess.Popen[bytes]:
+    def _started(self) -> subprocess.Popen[bytes] | Forked:
         if self._process is None:
             self._process = subprocess.Popen(
                 [sys.executable, '-c', f'import sys; sys.path[:] = {sys.path!r}; '
@@ -188,10 +240,14 @@ class Slices:
 
 def main() -> None:
     """Compute what comes on standard input until it ends."""
+    answers = os.fdopen(os.dup(1), 'wb')
+    os.dup2(2, 1)  # nothing else gets between the answers
+    _serve(sys.stdin.buffer, answers)
+
+
+def _serve(questions: IO[bytes], answers: IO[bytes]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for whoever asks
     os.nice(NICENESS)
-    answers, questions = os.fdopen(os.dup(1), 'wb'), sys.stdin.buffer
-    os.dup2(2, 1)  # nothing else gets between the answers
     with contextlib.suppress(EOFError, BrokenPipeError):
         while True:
             _answer(pickle.load(questions), answers)

@@ -65,6 +65,8 @@ class SuiteNode(ConnectedNode):
         Parameters that may change while the node runs; all others are read-only. Those that
         another node owns are refused with its name, and change only by
         :meth:`~dmp_cpg_ros.nodes.framework.changes.ParameterChanges.follow`.
+    JUDGES : bool
+        Whether it judges changes, for which a process that runs it has another one ready.
     certified : Certified, optional
         What judges changes, of a node that makes it in ``configure``.
     parameter_changes : ParameterChanges
@@ -78,6 +80,7 @@ class SuiteNode(ConnectedNode):
     KIND: ClassVar[str] = ''
     PARAMETER_SETS: ClassVar[tuple[type[Parameters], ...]] = ()
     CHANGEABLE: ClassVar[Collection[str]] = ()
+    JUDGES: ClassVar[bool] = False
     certified: Certified | None = None
     inputs: TickInputs
     elapsed = 0.0
