@@ -39,6 +39,7 @@ from dmp_cpg_ros.commands.suite_domain import alone_in_domain
 from dmp_cpg_ros.configuration import config_folders, find_config
 from dmp_cpg_ros.core.errors import MissingFileError
 from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError, claim
+from dmp_cpg_ros.studies.process_usage import children
 from dmp_cpg_ros.suite_table import WALKING_NODES
 
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
@@ -60,20 +61,6 @@ def scenario(folder: Path, duration_s: float) -> str:
 
 def walk(processes: Processes, *arguments: str) -> NodeProcess:
     return processes.executable('walk', *arguments)
-
-
-def children(parent: int) -> list[int]:
-    """Processes whose parent is a process."""
-    found = []
-    for folder in Path('/proc').iterdir():
-        if folder.name.isdigit():
-            try:
-                status = (folder / 'stat').read_text(encoding='utf-8')
-            except OSError:
-                continue
-            if int(status.rpartition(')')[2].split()[1]) == parent:
-                found.append(int(folder.name))
-    return found
 
 
 def alive(pid: int) -> bool:
