@@ -108,7 +108,8 @@ def test_the_study_walks_and_says_what_was_held(
     said = capsys.readouterr()
     assert status == 0, said
     measured = json.loads(file.read_text(encoding='utf-8'))
-    assert measured['moved_m'] > 0.1 and measured['refused'] == 0
+    # it is commanded for a time of the wall clock, in which a loaded machine does little
+    assert measured['moved_m'] > 0.1 * measured['real_time_factor'] and measured['refused'] == 0
     assert measured['refused_step'] == ''
     assert measured['states_hz'] > 0.0 and measured['commands_hz'] > 0.0
     assert set(measured['cores']) == {ROBOT, 'ros2_control_driver', 'composed_suite'}

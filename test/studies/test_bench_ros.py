@@ -48,13 +48,14 @@ def test_it_measures_the_suite_beside_relays(
         ros_domain: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / 'bench.json'
     named = ('startup', 'latency', 'cpu', 'wakeups', 'memory')
-    assert bench_ros.main(['--rows', *named, '--ways', 'composed', '--seconds', '1',
+    assert bench_ros.main(['--rows', *named, '--ways', 'composed', '--seconds', '3',
                            '--json', str(file)]) == 0
     rows, printed = json.loads(file.read_text(encoding='utf-8'))['rows'], capsys.readouterr().out
     assert list(dict.fromkeys(row['row'] for row in rows)) == list(named)
     for row in rows:
         assert row['what'] in printed and row['floor_is'] in ('relays', 'relays connected')
-        # Within a second a thread may not run at all, and nobody may have to wait.
+        # A thread may not run at all, and nobody may have to wait. The robot reports once in a
+        # second of its own, of which a loaded machine makes less than one of the wall clock.
         if not any(word in row['what'] for word in ('growth', 'preempted', 'waiting', 'threads')):
             assert row['measured'] > 0.0 and row['floor'] > 0.0 and row['ratio'] > 0.0, row
 
