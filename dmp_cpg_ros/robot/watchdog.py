@@ -22,7 +22,7 @@ from dmp_cpg_ros.core.modes.falls import BodySense, FallParameters
 from dmp_cpg_ros.core.modes.motion_library import RISE, lying_posture, time_unit
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets, RobotState
-from dmp_cpg_ros.robot.absent_legs import CARRIED_NS, TAKEN_UP_S, AbsentLegs, share
+from dmp_cpg_ros.robot.absent_legs import CARRIED_NS, JOINTS, TAKEN_UP_S, AbsentLegs, share
 from dmp_cpg_ros.robot.drive_watch import DriveWatch
 from dmp_cpg_ros.robot.last_cycle import LastCycle, Rhythm
 from dmp_cpg_ros.robot.start_pose import home_joint_position
@@ -268,8 +268,7 @@ class CommandWatchdog:
         for i in range(len(LEGS)):
             acting = self._memory.acting(i, now)
             if acting is not None:
-                joints = slice(len(JOINTS_OF_LEG) * i, len(JOINTS_OF_LEG) * (i + 1))
-                holds_ns, self._targets[:, joints] = acting
+                holds_ns, self._targets[:, JOINTS[i]] = acting
                 ages.append(now - holds_ns)
         return ages
 
@@ -348,4 +347,3 @@ class CommandWatchdog:
         carried = self._sense.carrying_torque(state, 1.0 - size)
         return JointTargets(
             goal + size * away, size * velocity + rate * away, size * effort + carried)
-

@@ -52,7 +52,7 @@ class JudgeError(Exception):
     """It could not be computed beside the ticks."""
 
 
-class Forked:
+class ForkedJudge:
     """A process that computes, forked from this one; as much of a :class:`subprocess.Popen` as is
     needed.
 
@@ -99,7 +99,7 @@ class Judge:
     def __init__(self) -> None:
         """Start nothing yet."""
         self._asked: queue.SimpleQueue[tuple[Compute, Use]] = queue.SimpleQueue()
-        self._process: subprocess.Popen[bytes] | Forked | None = None
+        self._process: subprocess.Popen[bytes] | ForkedJudge | None = None
         self._thread: threading.Thread | None = None
 
     @property
@@ -112,7 +112,7 @@ class Judge:
         imported all; but nothing of ROS may run yet, whose threads it would not have.
         """
         if self._process is None and hasattr(os, 'fork'):
-            self._process = Forked()
+            self._process = ForkedJudge()
 
     def ask(self, compute: Compute, use: Use) -> None:
         """Have something computed.
@@ -149,7 +149,7 @@ class Judge:
                 self._process = None
             return JudgeError(f'{type(error).__name__}: {error}')
 
-    def _started(self) -> subprocess.Popen[bytes] | Forked:
+    def _started(self) -> subprocess.Popen[bytes] | ForkedJudge:
         if self._process is None:
             self._process = subprocess.Popen(
                 [sys.executable, '-c', f'import sys; sys.path[:] = {sys.path!r}; '
@@ -246,6 +246,7 @@ def main() -> None:
 
 
 def _serve(questions: IO[bytes], answers: IO[bytes]) -> None:
+    """Answer questions, pickled, until they end; the process gives way to those with ticks."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for whoever asks
     os.nice(NICENESS)
     with contextlib.suppress(EOFError, BrokenPipeError):
