@@ -33,7 +33,7 @@ from dmp_cpg_ros.analysis.bag import base_name, opened, recorded
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import tilt
 from dmp_cpg_ros.commands.progress import Progress
-from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, positive, run_command
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.modes.falls import FALLEN_TILT
@@ -280,7 +280,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--nodes', nargs='+', choices=(*VICTIMS, RECORDER), default=VICTIMS,
         metavar='NODE', help=f'that are killed: {RECORDER}, or (default: all of them) '
         f'{", ".join(VICTIMS)}')
-    add('--rate', type=float, default=TickParameters.control_rate, metavar='HZ',
+    add('--rate', type=positive, default=TickParameters.control_rate, metavar='HZ',
         help='control rate, for a machine that is too slow for %(default)g Hz')
     add('--seed', type=int, default=0, help='of nodes and times (default: 0)')
     return parser
