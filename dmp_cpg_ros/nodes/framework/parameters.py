@@ -8,14 +8,21 @@ import array
 import dataclasses
 import inspect
 import sys
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import yaml
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    ParameterEvent,
+)
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -204,16 +211,34 @@ def declare(node: Node, table: ParameterTable) -> dict[type[Parameters], Paramet
         name: plain(override.value) for name, override in node._parameter_overrides.items()
         if not name.startswith(FOREIGN_PREFIXES)
         and (name in table.fields or name not in shared)})
-    for name, value in table.values(sets).items():
-        if value == ():
-            raise ParameterError(
-                f"parameter '{name}' must not be an empty list; {constraint(table.fields[name])}")
-        if name in node._parameter_overrides:
-            node._parameter_overrides[name] = Parameter(name, value=plain(value))
-        if not node.has_parameter(name):
-            node.declare_parameter(name, plain(table.fields[name].default),
-                                   table.descriptor(name))
+    with _told_at_once(node):
+        for name, value in table.values(sets).items():
+            if value == ():
+                raise ParameterError(f"parameter '{name}' must not be an empty list; "
+                                     f'{constraint(table.fields[name])}')
+            if name in node._parameter_overrides:
+                node._parameter_overrides[name] = Parameter(name, value=plain(value))
+            if not node.has_parameter(name):
+                node.declare_parameter(name, plain(table.fields[name].default),
+                                       table.descriptor(name))
     return sets
+
+
+@contextmanager
+def _told_at_once(node: Node) -> Iterator[None]:
+    """Gather the events of all parameters that are declared, of which rclpy publishes one each: a
+    node that comes back would wake all that follow it a hundred times.
+    """
+    publisher, gathered = node._parameter_event_publisher, list[ParameterEvent]()
+    node._parameter_event_publisher = SimpleNamespace(publish=gathered.append)
+    try:
+        yield
+    finally:
+        node._parameter_event_publisher = publisher
+    if gathered:
+        whole = gathered[-1]
+        whole.new_parameters = [entry for event in gathered for entry in event.new_parameters]
+        publisher.publish(whole)
 
 
 def parameter_files(arguments: Sequence[str]) -> list[str]:
