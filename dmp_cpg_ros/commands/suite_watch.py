@@ -9,6 +9,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from math import inf
 from typing import Any
 
 from lifecycle_msgs.msg import Transition
@@ -52,6 +53,11 @@ SETTLED_S = 0.3
 
 FIRST_WORD_S = 3.0
 """Waiting that is not worth a word [s]."""
+
+REMIND_S = 0.5
+"""How often the robot is to tell its ticks again where nodes have come back and it stands still
+[s]: each hears of a tick only once those before it have, and is believed after half a second.
+"""
 
 Say = Callable[[float, str], None]
 """Told at which time [s] what happens."""
@@ -106,6 +112,7 @@ class SuiteWatch:
         self._told: set[str] = set()  # processes of which that is known
         self._restarts: Counter[str] = Counter()  # since all were ready
         self._returning: health.ReadinessOfOthers | None = None
+        self._reminded_s = inf  # when it was looked last whether those that came back go on
         self._progress: tuple[int, bool] | None = None
         self._stood_ns = -1  # robot time when progress was looked at last
         self._stalled, self._stalled_s = health.Intervals(FIRST_WORD_S), 0.0
@@ -158,6 +165,7 @@ class SuiteWatch:
             self._say(self._player.progress_ns * 1e-9, 'all nodes are ready again')
             self._player.renew([node for name in self._restarts for node in self._shared[name]])
             self._restarts.clear()
+            self._reminded_s = time.monotonic()
         if not self._ending:
             self._look_for_stall()
 
@@ -170,9 +178,14 @@ class SuiteWatch:
         if self._progress is None or progress != self._progress and progress[1]:
             if self._asked is not None:
                 self._asked.end()
+            self._reminded_s = max(self._reminded_s, now)
             self._progress, self._asked, self._stood_ns = progress, None, progress[0]
             self._stalled, self._stalled_s = health.Intervals(FIRST_WORD_S), now
-        elif self._stalled.due() and progress[0] > 0 and self._returning is None:
+            return
+        if now > self._reminded_s + REMIND_S:
+            self._reminded_s = now
+            player.remind()
+        if self._stalled.due() and progress[0] > 0 and self._returning is None:
             # Ticks that go on while the robot looks after itself need no word, and shall not have
             # one by the wall clock.
             stands, self._stood_ns = progress[0] == self._stood_ns, progress[0]

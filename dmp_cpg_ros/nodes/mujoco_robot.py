@@ -49,7 +49,7 @@ from dmp_cpg_ros.robot.urdf import urdf
 from dmp_cpg_ros.strict_yaml import parse_yaml
 from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, ROBOT
 
-READY_PERIOD_S, REMIND_S = 0.05, 3.0
+READY_PERIOD_S, REMIND_S = 0.05, 1.0
 """How often a lock-step robot without a gate asks whether its partners are there, and after which
 time it tells a tick again that does not end [s].
 """
@@ -235,9 +235,8 @@ class MujocoRobotNode(DrivenRobot):
         """Tell the last tick again, for a node that was restarted and may not have heard it; and
         what is sensed of the one before: the inhibition may have died before that tick ended, with
         who tells it of the body; what it says acts one tick later, so that the robot had gone on.
-        Who holds has had targets of the last tick, so that all have ended the one before.
         """
-        if len(self._told) > 1 and not self._holding:
+        if len(self._told) > 1:
             for name, message in self._told[0].items():
                 self._state_publishers[name].publish(message)
         self._publish_all()

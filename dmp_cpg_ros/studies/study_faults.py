@@ -64,7 +64,7 @@ class Kill:
     Attributes
     ----------
     node : str
-        Which.
+        Which; several that were killed at once with a ``+`` between them.
     time_s : float
         On the robot's clock [s].
     back_s, in_phase_s, as_fast_s : float
@@ -140,15 +140,17 @@ def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence
     for number, node in enumerate(nodes if going else ()):
         tell(f'{way}: {number} of {len(nodes)} kills')
         time.sleep(rng.uniform(2.0, 8.0))
-        begin, pid = len(walk.lines), walk.pid_of([node])
-        if not pid:
+        begin, together = len(walk.lines), node.split('+')
+        pids = [walk.pid_of([each]) for each in together]
+        if not all(pids):
             break
         kill = Kill(node)
         outcome.kills.append(kill)
-        os.kill(pid, signal.SIGKILL)
+        for pid in pids:
+            os.kill(pid, signal.SIGKILL)
         if not respawn:
             break
-        kill.time_s = walk.said(f'{node} was ended', begin)
+        kill.time_s = max(walk.said(f'{each} was ended', begin) for each in together)
         ready = walk.said(READY, begin)
         walks = ready < inf and (lock_step or node == RECORDER or walk.walks())
         follows = walk.told(FOLLOWS, begin)
@@ -253,12 +255,11 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
         for respawn in options.respawn:
             for lock_step in options.lock_step:
                 for gait, speed in WALKS:
-                    nodes = list(options.nodes)
-                    if respawn:
-                        rng.shuffle(nodes)
-                        wanted = list(islice(cycle(nodes), options.kills))
-                    else:
-                        wanted = [rng.choice(nodes)]
+                    nodes, together = list(options.nodes), options.together
+                    rng.shuffle(nodes)
+                    turn = cycle(nodes)
+                    wanted = ['+'.join(islice(turn, together))
+                              for _ in range(options.kills if respawn else 1)]
                     with folder_of_logs(options.logs and (
                             options.logs / f'{len(outcomes):03}_{gait}')) as folder:
                         outcomes.append(run(
@@ -275,6 +276,7 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add('--rounds', type=int, default=5, help='times through all ways to walk (default: 5)')
     add('--kills', type=int, default=16, help='kills in a walk with --respawn (default: 16)')
+    add('--together', type=int, default=1, help='nodes that are killed at once (default: 1)')
     add('--respawn', type=_choices, default=[True, False], metavar='yes|no|both')
     add('--lock-step', type=_choices, default=[True, False], metavar='yes|no|both')
     add('--nodes', nargs='+', choices=(*VICTIMS, RECORDER), default=VICTIMS,

@@ -10,6 +10,7 @@ import os
 import re
 import signal
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -99,12 +100,17 @@ def test_in_lock_step_the_walk_goes_on_as_if_nobody_had_died(
 
 def test_in_lock_step_the_walk_goes_on_after_the_death_of_each_block(
         processes: Processes, tmp_path: Path) -> None:
-    process = walk(processes, tmp_path, 6.0, *LOCK_STEP, '--respawn', '--processes', 'blocks')
+    process = walk(processes, tmp_path, 12.0, *LOCK_STEP, '--respawn', '--processes', 'blocks')
     process.wait_for_output(r's +walking', RUN_S)
     blocks = [name for name in PROCESSES['blocks'] if name != ROBOT]
-    for count, name in enumerate(blocks, 1):
-        os.kill(process.pid_of(PROCESSES['blocks'][name][0]), signal.SIGKILL)
-        process.wait_for_output(rf'{name} was ended by signal 9 \(SIGKILL\)', RUN_S)
+    # The gait is forgotten where both die of whom either remembers it.
+    pairs = [pair for pair in combinations(blocks, 2) if pair != ('gait', 'supervision')]
+    for count, names in enumerate([*((name,) for name in blocks), *pairs], 1):
+        for pid in [process.pid_of(PROCESSES['blocks'][name][0]) for name in names]:
+            os.kill(pid, signal.SIGKILL)
+        for name in names:
+            process.wait_for_output(
+                rf'(?s)({name} was ended by signal 9 \(SIGKILL\).*){{{1 + count // 4}}}', RUN_S)
         process.wait_for_output(rf'(?s)({AGAIN}.*){{{count}}}', RUN_S)
     assert process.wait(RUN_S) == 0, str(process)
     assert_undisturbed(tmp_path / 'run')

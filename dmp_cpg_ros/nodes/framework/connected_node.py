@@ -35,6 +35,11 @@ WATCH_EVERY_S = 0.5
 """How often strangers are looked for [s]."""
 
 
+REMEMBERED = 4
+"""In lock-step: how many of the last messages of a latched topic that tells something at every
+tick are read by who comes late.
+"""
+
 HEARD_WITHIN_S = 1.0
 """How long all readers together may take to hear the last that a node has said [s]; one that was
 killed has not acknowledged anything."""
@@ -157,6 +162,8 @@ class ConnectedNode(GuardedLifecycleNode):
             receive = self.writers.all_of(topic, take) if raw else (
                 self.writers.only(topic, callback, read))
         usual = topic.lossy_qos if self.lossy else topic.reader_qos
+        if topic.latched and topic.name in REPEATED and self.lock_step:
+            usual.depth = REMEMBERED  # a node that is restarted goes on from one of these ticks
         subscription = self.create_subscription(
             topic.type, topic.name, receive, qos or usual, raw=True)
         if informed:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
+from dmp_cpg_ros.core.suite_parameters import TickParameters
 from dmp_cpg_ros.nodes.messages.canonical_state import GaitMemoryReader
 from dmp_cpg_ros.nodes.messages.interfaces import BLIND_NS
 from dmp_cpg_ros.nodes.messages.values import header_ns
@@ -60,15 +61,21 @@ class GaitMemory:
     def awaited(self, stamp_ns: int, values: dict[str, Any]) -> bool:
         """Whether nothing is remembered yet that may be; a run's first tick has the stamp 0. In
         lock-step the node takes the tick as soon as that is over, and it knows the parameters of
-        the others.
+        the others and what acts; a tick of before the memory it does not take at all.
         """
         if self._asked or stamp_ns <= 0:
             return False
         if self._node.lock_step:
             now_s, certified = time.monotonic(), self._node.certified
             self._until_s = min(self._until_s, now_s + LOCK_STEP_S)
+            known_ns = header_ns(self._kept[0]) if self._kept else -1
+            if known_ns > stamp_ns:
+                return True  # all have ended that tick, also this node, before it died
+            values['inhibition_gains'] = gains = self._node.inputs.before(
+                'inhibition_gains', stamp_ns)
+            acting_ns = min(known_ns, stamp_ns - self._node.parameters_of(TickParameters).tick_ns)
             waits = (certified is not None and certified.others.awaited()) or (
-                not self._kept and now_s < self._until_s)
+                now_s < self._until_s and (not self._kept or not gains or gains[0] < acting_ns))
             self._held = (stamp_ns, values) if waits else None
             return waits
         if self._kept or not self._node.return_ns:

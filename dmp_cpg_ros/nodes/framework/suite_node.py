@@ -85,6 +85,7 @@ class SuiteNode(ConnectedNode):
     inputs: TickInputs
     elapsed = 0.0
     _failed, _begun_s = '', 0.0
+    _said_before: tuple[int, list[Callable[[], None]]] = (-1, [])
 
     def __init__(self, name: str | None = None, **options: Any) -> None:
         """Create the node and check its parameters; raises ParameterError for a bad one."""
@@ -275,7 +276,7 @@ class SuiteNode(ConnectedNode):
 
     def _run_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         self.elapsed = self._clock_of_ticks.step(stamp_ns)
-        self._said.clear()
+        self._said_before, self._said[:] = (self.health.stamp_ns, list(self._said)), []
         try:
             self.begin_tick(stamp_ns)
             self.on_tick(stamp_ns, values)
@@ -299,9 +300,13 @@ class SuiteNode(ConnectedNode):
         """Stamp of the tick that has begun and cannot end [ns], and what it lacks."""
         return self.inputs.awaited() if hasattr(self, 'inputs') else (-1, [])
 
-    def _repeat(self) -> None:
-        """Publish the last tick's messages again, for a node that was restarted meanwhile."""
-        for publish in list(self._said):
+    def _repeat(self, stamp_ns: int) -> None:
+        """Publish again what was said in a tick, one of the last two, or in the last before it,
+        for a node that was restarted meanwhile.
+        """
+        before_ns, before = self._said_before
+        for publish in before if stamp_ns == before_ns else list(self._said) if (
+                stamp_ns >= self.health.stamp_ns) else ():
             publish()
 
     # Diagnostics -------------------------------------------------------------------------------

@@ -39,10 +39,14 @@ class TickInputs:
 
     In lock-step a tick fires when every input with its stamp is there, and every delayed input
     with the stamp of the tick before (at the first tick delayed inputs are what came before it, or
-    None). A message that comes again is passed on to ``on_repeat``. In real time it
-    fires the same way, or else with the newest value of each input that does not come: that was
-    lost, for a later one of its kind is there; that is silent; or for which ``HOLD_TICKS`` later
-    ticks have waited. A node that stalls so delays those behind it instead of being left behind.
+    None). The trigger of a tick that comes again is passed on to ``on_repeat``. A node that is
+    restarted is told of the last two ticks again: it begins with the former, of which somebody may
+    lack what it has said, or with the latter if only that is told again; and it does not wait for
+    what is missing of a tick if it is told again of a later one, for which all have ended it. In
+    real time a tick fires the same way, or else with the newest value of each input that does not
+    come: that was lost, for a later one of its kind is there; that is silent; or for which
+    ``HOLD_TICKS`` later ticks have waited. A node that stalls so delays those behind it instead of
+    being left behind.
 
     Every writer sends its stamps in rising order during one run of the robot, and its messages
     keep their order. So a message that lies behind the last tick, but beyond what its writer told
@@ -65,14 +69,15 @@ class TickInputs:
         the first arrives.
     lock_step : bool
         Whether ticks wait for exact stamps.
-    on_repeat : callable (), optional
-        Called in lock-step when the trigger of the last tick, or of one that waits, comes again.
+    on_repeat : callable (stamp_ns), optional
+        Called in lock-step when the trigger of a tick that has fired, or of one that waits, comes
+        again.
     """
 
     def __init__(self, on_tick: TickCallback, inputs: Sequence[str], trigger: str, *,
                  delayed: Sequence[str] = (),
                  optional: Sequence[str] = (), lock_step: bool = False,
-                 on_repeat: Callable[[], None] = lambda: None) -> None:
+                 on_repeat: Callable[[int], None] = lambda _: None) -> None:
         """Start without any message."""
         others = set(inputs) - {trigger}
         if trigger not in inputs or not set(optional) <= others or set(delayed) & set(inputs):
@@ -96,6 +101,7 @@ class TickInputs:
         self._newest: dict[str, tuple[int, Any]] = {}
         self._late: dict[str, dict[int, Any]] = {name: {} for name in self._delayed}
         self._missed = dict.fromkeys(self._inputs, 0)
+        self._told_again = set[int]()
         self.last_ns: int | None = None
         self._near_ns: int | None = None  # the last tick, or what the trigger began anew with
 
@@ -140,16 +146,16 @@ class TickInputs:
             if last is None or stamp_ns >= last:
                 self._missed[name] = 0
         if last is not None and stamp_ns <= last:
-            self._ignore(name, stamp_ns == last)
+            self._ignore(name, stamp_ns)
             return True
         tick = self._pending.setdefault(stamp_ns, {})
         if name in tick:
-            self._ignore(name, last is not None)
+            self._ignore(name, stamp_ns)
             return True
         tick[name] = value
         if not self._lock_step:
             self._fire_newest()
-        elif len(tick) == len(self._inputs):
+        elif last is None or len(tick) == len(self._inputs):
             self._fire_exact()
         if len(self._pending) > PENDING_TICKS:
             del self._pending[min(self._pending)]
@@ -189,6 +195,11 @@ class TickInputs:
         return stamp, [name for name in self._inputs if name not in self._pending[stamp]] + [
             name for name in self._delayed if last is not None and last not in self._late[name]]
 
+    def before(self, name: str, stamp_ns: int) -> Any:
+        """Newest value of a delayed input that can act at a stamp [ns]; None without any."""
+        late = self._late[name]
+        return late.get(max((at for at in late if at < stamp_ns), default=-1))
+
     def newest_ns(self, name: str) -> int:
         """Newest stamp of an input [ns]; −1 without any."""
         return self._newest.get(name, (-1, None))[0]
@@ -198,10 +209,15 @@ class TickInputs:
         newest = self._newest.get(name)
         return newest is not None and newest[0] >= stamp_ns
 
-    def _ignore(self, name: str, repeated: bool) -> None:
+    def _ignore(self, name: str, stamp_ns: int) -> None:
         self.ignored += 1
-        if repeated and self._lock_step and name == self._trigger:
-            self._on_repeat()
+        if not self._lock_step or name != self._trigger:
+            return
+        if self.last_ns is not None:
+            self._on_repeat(stamp_ns)
+        if stamp_ns in self._pending:
+            self._told_again.add(stamp_ns)
+            self._fire_exact()
 
     def _add_delayed(self, name: str, stamp_ns: int, value: Any) -> None:
         if not self._lock_step:
@@ -214,25 +230,37 @@ class TickInputs:
         self._fire_exact()
 
     def _fire_exact(self) -> None:
-        """Lock-step: fire the oldest tick once it is complete; later ticks never overtake it, but
-        for the first one of a node that was restarted, which is told of ticks before it, too.
+        """Lock-step: fire the oldest tick once it is complete; later ones overtake it only where
+        the node is told of them again, and what is missing of it does not come.
         """
         while self._pending:
-            last, stamp, full = self.last_ns, min(self._pending), len(self._inputs)
-            if last is None:
-                whole = [at for at, tick in self._pending.items() if len(tick) == full]
-                stamp = min(whole, default=stamp)
-                self._pending = {at: of for at, of in self._pending.items() if at >= stamp}
-            tick = self._pending[stamp]
-            if len(tick) < full:
+            last, full = self.last_ns, len(self._inputs)
+            whole = [at for at, tick in self._pending.items() if len(tick) == full]
+            stamp = min(whole, default=-1)
+            if not whole or not self._may_fire(stamp):
                 return
-            for name in self._delayed:
-                if last is not None and last not in self._late[name]:
+            tick, behind = self._pending[stamp], max(self._told_again, default=-1) > stamp
+            for name, late in self._late.items():
+                if last in late:
+                    tick[name] = late[last]
+                elif last is None or behind:
+                    tick[name] = self.before(name, stamp)
+                else:
                     return
-                late = self._late[name]
-                known = max((at for at in late if at < stamp), default=-1)
-                tick[name] = late[last] if last is not None else late.get(known)
+            self._pending = {at: of for at, of in self._pending.items() if at >= stamp}
+            self._told_again = {at for at in self._told_again if at > stamp}
             self._fire(stamp, tick)
+
+    def _may_fire(self, stamp: int) -> bool:
+        """Whether a complete tick is the next: the oldest, or told again; the first one of a run,
+        or one after which another has begun.
+        """
+        if max(self._told_again, default=-1) >= stamp:
+            return True
+        if self.last_ns is not None:
+            return stamp == min(self._pending)
+        return stamp <= 0 or any(
+            at > stamp and self._trigger in tick for at, tick in self._pending.items())
 
     def _fire_newest(self) -> None:
         """Real time: fire, oldest first, each tick that has nothing to wait for any more."""
@@ -278,7 +306,8 @@ class TickInputs:
     def _fire(self, stamp: int, tick: dict[str, Any]) -> None:
         del self._pending[stamp]
         for name, late in self._late.items() if self._lock_step else ():
-            self._late[name] = {at: value for at, value in late.items() if at >= stamp}
+            acting = max((at for at in late if at < stamp), default=stamp)
+            self._late[name] = {at: value for at, value in late.items() if at >= acting}
         self.last_ns = self._near_ns = stamp
         self._on_tick(stamp, tick)
 
