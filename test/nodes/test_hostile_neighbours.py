@@ -45,6 +45,7 @@ from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_parameter_events
 from rclpy.serialization import serialize_message
 from ros_processes import DEADLINE_S, SHARED_HZ, NodeProcess, Processes, Ros
@@ -207,6 +208,22 @@ def test_every_false_news_of_parameters_is_counted(ros: Ros, follower: Any) -> N
         ros.spin_until(lambda number=number: counted.get('/parameter_events') == number,
                        what=lambda: str(counted))
     assert follower.get_parameter('gait').value == 'amble'
+
+
+def test_a_node_tells_of_all_its_parameters_at_once(
+        ros: Ros, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else one that is restarted would wake all that follow it a hundred times."""
+    told, publish = list[Any](), Publisher.publish
+    monkeypatch.setattr(Publisher, 'publish', lambda self, message: (
+        told.append(message), publish(self, message)))
+    node = ReferenceFilter('teller', context=ros.context)
+    try:
+        events = [message for message in told if isinstance(message, ParameterEvent)]
+        *_, own = events
+        assert {entry.name for entry in own.new_parameters} == set(node.parameter_table().fields)
+        assert sum(len(event.new_parameters) > 1 for event in events) == 1
+    finally:
+        node.destroy_node()
 
 
 @pytest.fixture
