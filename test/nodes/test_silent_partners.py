@@ -422,7 +422,7 @@ def test_the_gait_is_remembered_for_nodes_that_may_come_back(
     node.destroy_node()
 
 
-@pytest.mark.parametrize(('silent', 'goes_on'), [(150, True), (280, False)])
+@pytest.mark.parametrize(('silent', 'goes_on'), [(150, True), (400, False)])
 def test_oscillators_and_reference_that_come_back_in_time_go_on_in_phase(
         ros: Ros, silent: int, goes_on: bool) -> None:
     """As those would have that had not been away."""
@@ -469,7 +469,9 @@ def test_a_memory_that_does_not_come_is_waited_for_no_longer_than_for_a_while(ro
 @pytest.mark.parametrize('comes', [True, False])
 def test_in_lock_step_the_first_tick_of_who_comes_back_waits_for_the_memory(
         ros: Ros, monkeypatch: pytest.MonkeyPatch, comes: bool) -> None:
-    """It may be found later than what the tick goes by; who waits in vain goes on from zero."""
+    """It may be found later than what the tick goes by; who waits in vain goes on from zero.
+    A tick of before it has been ended by all.
+    """
     lock_step = [Parameter('lock_step', value=True)]
     reference, sent = ReferenceFilter(
         'reference_filter', context=ros.context, parameter_overrides=lock_step), list[Any]()
@@ -478,14 +480,20 @@ def test_in_lock_step_the_first_tick_of_who_comes_back_waits_for_the_memory(
     reference._publisher.publish = sent.append  # type: ignore[method-assign]
     loop, before, tick = walked(750)
     stamp = before.time_ns + TICK
-    reference.on_tick(stamp, {'joint_states': None, 'inhibition_gains': (stamp, ACTS)})
+    gains = (before.time_ns, ACTS)
+    reference.on_tick(stamp, {'joint_states': None, 'inhibition_gains': gains})
     reference._memory._try_again()
     assert not sent
     if comes:
         reference._memory._hear(GaitMemoryWriter(tuple(load_gaits())).fill(
             before.time_ns, tick.x, tick.x_dot, tick.gait, tick.r))
         assert not sent  # nor does it know what the others have accepted
+        assert reference._memory.awaited(before.time_ns - TICK, {}) and not sent
+        assert reference._memory._held == (stamp, {'joint_states': None, 'inhibition_gains': None})
         reference.certified.others.unheard.clear()
+        reference._memory._try_again()
+        assert not sent  # nor what acts
+        reference.inputs.add('inhibition_gains', before.time_ns, gains)
         reference._memory._try_again()
     else:
         later_s = time.monotonic() + gait_memory.LOCK_STEP_S
