@@ -194,6 +194,8 @@ def _judge(outcome: Outcome, speed: float, folder: Path) -> None:
     leaning, height = tilt(odometry.quaternion), odometry.position_in_world[:, 2]
     outcome.fell = bool(leaning.max() > FALLEN_TILT)
     outcome.end = posture(leaning[-1], height[-1], height[0])
+    if len(canonical.time) < 2:  # it never walked
+        return
     phases = load_gaits()[outcome.gait].phases
     own = np.array([[scalar_phase(*leg) for leg in x] for x in canonical.x.tolist()]) - phases
     off = np.abs(np.angle(np.exp(1j * (own - own[:, :1])))).max(axis=1)
