@@ -42,9 +42,6 @@ LONGEST_STEP = 0.005
 AT_REST = 0.05
 """Rates |ẋ| up to which oscillators rest and may be turned [1/s]."""
 
-LOOKS_EVERY = 25
-"""Steps on the way to rest between two looks at whether it is near."""
-
 
 @dataclass(frozen=True)
 class CanonicalParameters(Parameters):
@@ -272,18 +269,16 @@ class GaitNetwork:
     def rest_state(self, inhibition: Inhibition, tick: float = 0.004,
                    duration: float = 8.0) -> Array:
         """Equilibrium (4, 2) that is reached from the locked state under inhibition at zero
-        reference: by steps until it is near, and then by Newton's iteration.
+        reference; a last digit that goes back and forth is followed to the end.
         """
-        x, r = self.locked_state(), np.zeros(3)
-        for number in range(round(duration / tick)):
-            following = self.step(x, r, inhibition, tick)
-            if np.array_equal(following, x):
-                break
-            if not number % LOOKS_EVERY and np.abs(following - x).max() < AT_REST * tick:
-                rests = self.settled(following, r, inhibition)
-                if rests is not None:
-                    return rests
-            x = following
+        x, r, steps = self.locked_state(), np.zeros(3), round(duration / tick)
+        way, met = [x], {x.tobytes(): 0}
+        for number in range(1, steps + 1):
+            x = self.step(x, r, inhibition, tick)
+            first = met.setdefault(x.tobytes(), number)
+            if first < number:
+                return way[first + (steps - first) % (number - first)]
+            way.append(x)
         return x
 
     def settled(self, x: Array, r: Array, inhibition: Inhibition) -> Array | None:

@@ -153,6 +153,21 @@ def test_rest_state_is_an_equilibrium_inside_the_region() -> None:
     assert np.any(inhibition.acting_gains(x, of.system.target))
 
 
+@pytest.mark.parametrize('gain', [400.0, 20.0])
+def test_rest_state_is_where_all_steps_lead(gain: float) -> None:
+    """To the last digit, which in a trot goes back and forth, and without rest where it breaks
+    free.
+    """
+    of, inhibition = network('trot'), Inhibition(True, np.array([gain, 0, 0, 0]), 0.3)
+    x = of.locked_state()
+    for number in range(2000):
+        if number in (1000, 1001):
+            duration = number * TICK
+            assert np.array_equal(of.rest_state(inhibition, TICK, duration), x)
+        x = of.step(x, np.zeros(3), inhibition, TICK)
+    assert np.array_equal(of.rest_state(inhibition, TICK, 2000 * TICK), x)
+
+
 def test_phase_errors_do_not_see_a_common_phase() -> None:
     of = network('walk')
     for phi in (-3.0, 0.1, 2.5):
