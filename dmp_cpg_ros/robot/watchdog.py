@@ -35,11 +35,6 @@ HELD_NS = 100_000_000
 LATE_NS = 1_000_000_000
 """Time for which targets may be late again and again until the robot looks after itself [ns]."""
 
-ELSEWHERE_NS = 1_000_000_000
-"""Age of a leg's absence up to which it is waited for at most if it is back, but elsewhere in the
-gait [ns]: a robot that walks on without it for longer may fall.
-"""
-
 STAND_S = 0.15
 """Time in which a stand is taken up from wherever the joints are [s]: a raised foot has to be down
 before the robot tips over to its side.
@@ -139,8 +134,7 @@ class CommandWatchdog:
         self.drives = DriveWatch(description)
         self._tilt = FallParameters().fall_tilt
         self._memory = LastCycle()
-        self._absent = AbsentLegs(
-            self._memory, min(timeout_ns + return_ns, ELSEWHERE_NS))
+        self._absent = AbsentLegs(self._memory, timeout_ns + return_ns)
         self._given, self._off = np.zeros(12), np.zeros(12)
         self._begin_ns = self._uneasy_ns = 0
         self._ease_ns, self._alone_ns = AT_EASE_NS, -AGAIN_NS
