@@ -422,7 +422,7 @@ def test_the_gait_is_remembered_for_nodes_that_may_come_back(
     node.destroy_node()
 
 
-@pytest.mark.parametrize(('silent', 'goes_on'), [(150, True), (400, False)])
+@pytest.mark.parametrize(('silent', 'goes_on'), [(150, True), (280, False)])
 def test_oscillators_and_reference_that_come_back_in_time_go_on_in_phase(
         ros: Ros, silent: int, goes_on: bool) -> None:
     """As those would have that had not been away."""
