@@ -257,7 +257,8 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
         for respawn in options.respawn:
             for lock_step in options.lock_step:
                 for gait, speed in WALKS:
-                    nodes, together = list(options.nodes), options.together
+                    nodes = list(options.nodes)
+                    together = min(options.together, len(nodes))
                     rng.shuffle(nodes)
                     turn = cycle(nodes)
                     wanted = ['+'.join(islice(turn, together))
@@ -278,7 +279,8 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add('--rounds', type=int, default=5, help='times through all ways to walk (default: 5)')
     add('--kills', type=int, default=16, help='kills in a walk with --respawn (default: 16)')
-    add('--together', type=int, default=1, help='nodes that are killed at once (default: 1)')
+    add('--together', type=int, default=1, choices=range(1, len(VICTIMS) + 1), metavar='N',
+        help='nodes that are killed at once, at most all of them (default: 1)')
     add('--respawn', type=_choices, default=[True, False], metavar='yes|no|both')
     add('--lock-step', type=_choices, default=[True, False], metavar='yes|no|both')
     add('--nodes', nargs='+', choices=(*VICTIMS, RECORDER), default=VICTIMS,
