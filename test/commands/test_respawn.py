@@ -9,6 +9,7 @@ import json
 import os
 import re
 import signal
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
@@ -105,12 +106,14 @@ def test_in_lock_step_the_walk_goes_on_after_the_death_of_each_block(
     blocks = [name for name in PROCESSES['blocks'] if name != ROBOT]
     # The gait is forgotten where both die of whom either remembers it.
     pairs = [pair for pair in combinations(blocks, 2) if pair != ('gait', 'supervision')]
+    died = Counter[str]()
     for count, names in enumerate([*((name,) for name in blocks), *pairs], 1):
+        died.update(names)
         for pid in [process.pid_of(PROCESSES['blocks'][name][0]) for name in names]:
             os.kill(pid, signal.SIGKILL)
         for name in names:
             process.wait_for_output(
-                rf'(?s)({name} was ended by signal 9 \(SIGKILL\).*){{{1 + count // 4}}}', RUN_S)
+                rf'(?s)({name} was ended by signal 9 \(SIGKILL\).*){{{died[name]}}}', RUN_S)
         process.wait_for_output(rf'(?s)({AGAIN}.*){{{count}}}', RUN_S)
     assert process.wait(RUN_S) == 0, str(process)
     assert_undisturbed(tmp_path / 'run')
