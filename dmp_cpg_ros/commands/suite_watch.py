@@ -9,7 +9,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from math import inf
 from typing import Any
 
 from lifecycle_msgs.msg import Transition
@@ -112,7 +111,7 @@ class SuiteWatch:
         self._told: set[str] = set()  # processes of which that is known
         self._restarts: Counter[str] = Counter()  # since all were ready
         self._returning: health.ReadinessOfOthers | None = None
-        self._reminded_s = inf  # when it was looked last whether those that came back go on
+        self._reminded_s = math.inf  # when it was looked last whether those that came back go on
         self._progress: tuple[int, bool] | None = None
         self._stood_ns = -1  # robot time when progress was looked at last
         self._stalled, self._stalled_s = health.Intervals(FIRST_WORD_S), 0.0

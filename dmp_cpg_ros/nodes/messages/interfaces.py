@@ -289,7 +289,9 @@ BLIND_NS = 250_000_000
 
 REPEATED = ('reference', 'canonical_state', 'posture_feedback', 'joint_targets',
             'inhibition_gains')
-"""What nodes publish again in lock-step when they hear the trigger of their last tick again."""
+"""What nodes publish again in lock-step when they hear the trigger of one of their last two ticks
+again.
+"""
 
 SELDOM = ('inhibition_state', 'drive_mode', 'body_mode')
 """What is latched, recorded, and told when something begins: a recording without one of them tells
