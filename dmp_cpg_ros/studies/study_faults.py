@@ -3,11 +3,12 @@
 """Kills nodes of a walking suite with SIGKILL, each in turn at random times, and tabulates it all.
 
 With --respawn one walk takes many kills, each after all nodes have been ready again; without, one.
-A walk is in phase again when its oscillators turn, each in its place; it is as fast again when the
-body has half of its speed besides. The cycles until then count from the moment at which the robot
-follows its legs again, or at which all nodes are ready, whichever is earlier. A recorder that is
-killed leaves a bag that nobody has closed: what is told is how much of the time before the kill is
-not in it, and how many ticks are missing within. Exit status 1 when a robot fell.
+A walk is in phase again when its oscillators turn, each in its place, and go on to do so; it is as
+fast again when the body has half of its speed besides. The cycles until then count from the moment
+at which the robot follows its legs again, or at which all nodes are ready, whichever is earlier. A
+recorder that is killed leaves a bag that nobody has closed: what is told is how much of the time
+before the kill is not in it, and how many ticks are missing within. Exit status 1 when a robot
+fell.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from math import inf, nan
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.bag import base_name, opened, recorded
 from dmp_cpg_ros.analysis.loading import load_recording
@@ -36,6 +38,7 @@ from dmp_cpg_ros.commands.progress import Progress
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, positive, run_command
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.modes.falls import FALLEN_TILT
 from dmp_cpg_ros.core.suite_parameters import TickParameters
 from dmp_cpg_ros.studies.link_watch import posture
@@ -51,9 +54,16 @@ VICTIMS = tuple(node for node in WALKING_NODES if node != ROBOT)
 
 READY, FOLLOWS = 'all nodes are ready again', 'the robot follows its legs again'
 
-COLUMNS = ('gait', 'time', 'respawn', 'walks', 'kills', 'fell', 'in phase again', 'cycles, median '
-           '/ worst', 'until as fast again', 'seconds after the kill, median / worst',
-           'ended standing / lying / fallen',
+STANDS = 'the robot looks after itself'
+
+GOES_ON_S = 2.0
+"""Time for which a walk has to go on well, unless the next kill forestalls it [s]: who comes back
+but is elsewhere in the gait is followed no longer after a second or so.
+"""
+
+COLUMNS = ('gait', 'time', 'respawn', 'walks', 'kills', 'fell', 'came to a stand',
+           'in phase again', 'cycles, median / worst', 'until as fast again',
+           'seconds after the kill, median / worst', 'ended standing / lying / fallen',
            "recorder's bags: s missing, median / worst; gaps")
 
 
@@ -73,7 +83,9 @@ class Kill:
     follows_s : float
         When the robot, which had looked after itself, followed its legs again [s].
     period_s : float
-        Of the gait before [s].
+        Of the gait [s].
+    stood : bool
+        Whether the robot came to a stand by itself after it.
     unrecorded_s : float
         Of the recorder: time before the kill that is not in its bag [s].
     gaps : int
@@ -87,6 +99,7 @@ class Kill:
     in_phase_s: float = inf
     as_fast_s: float = inf
     period_s: float = nan
+    stood: bool = False
     unrecorded_s: float = nan
     gaps: int = 0
 
@@ -162,10 +175,18 @@ def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence
     elif outcome.kills:  # by which it ends
         with suppress(subprocess.TimeoutExpired):
             walk.process.wait(WITHIN_S)
+    stood = walk.told(STANDS) if outcome.kills else []
+    for kill, following_s in _each_until_the_next(outcome.kills):
+        kill.stood = any(kill.time_s < at_s < following_s for at_s in stood)
     outcome.status = walk.end()
     (folder / 'said.txt').write_text(''.join(walk.lines))
     _judge(outcome, speed, folder / 'run')
     return outcome
+
+
+def _each_until_the_next(kills: Sequence[Kill]) -> Iterator[tuple[Kill, float]]:
+    """Kills, each with the time of the next one [s]."""
+    return zip(kills, [*(kill.time_s for kill in kills[1:]), inf], strict=False)
 
 
 def _judge_bags(kills: Sequence[Kill], folder: Path) -> None:
@@ -202,19 +223,30 @@ def _judge(outcome: Outcome, speed: float, folder: Path) -> None:
     pace = np.interp(canonical.time, odometry.time, odometry.velocity_in_base[:, 0])
     turned = np.unwrap(own[:, 0])
     rate = np.gradient(turned, canonical.time)
-    following = [kill.time_s for kill in outcome.kills[1:]] + [inf]
-    for kill, following_s in zip(outcome.kills, following, strict=True):
-        before = (canonical.time > kill.time_s - 1.0) & (canonical.time <= kill.time_s)
-        if before.sum() > 1:
-            way = np.ptp(turned[before]) / np.ptp(canonical.time[before])
-            kill.period_s = 2.0 * np.pi / way if way > 0.0 else nan
+    turns = rate[(off <= LOCKED_PHASE_ERROR) & (rate > 1.0)]
+    period_s = 2.0 * np.pi / float(np.median(turns)) if len(turns) else nan
+    for kill, following_s in _each_until_the_next(outcome.kills):
+        kill.period_s = period_s
         # While the robot comes to a stand by itself its pace is not that of its legs.
-        well = ((canonical.time >= max(kill.back_s, kill.follows_s)) & (off <= LOCKED_PHASE_ERROR)
-                & (rate > np.pi / kill.period_s))
-        kill.in_phase_s, kill.as_fast_s = (
-            # one that the next kill forestalled says nothing
-            next(iter(canonical.time[so & (canonical.time <= following_s)].tolist()), inf)
-            for so in (well, well & (pace > 0.5 * speed)))
+        well = ((off <= LOCKED_PHASE_ERROR) & (rate > np.pi / period_s)
+                & (canonical.time >= max(kill.back_s, kill.follows_s)))
+        for name, so in (('in_phase_s', well), ('as_fast_s', well & (pace > 0.5 * speed))):
+            setattr(kill, name, _from_when_on(canonical.time, so, following_s))
+
+
+def _from_when_on(times: Array, so: NDArray[np.bool_], until_s: float) -> float:
+    """First time since when something has been so for ``GOES_ON_S``, or until an end [s];
+    infinite without any.
+    """
+    before = times <= until_s  # one that the next kill forestalls says nothing
+    times, so = times[before], so[before]
+    begins = np.flatnonzero(so & ~np.append(False, so[:-1]))
+    ends = np.append(np.flatnonzero(~so), len(so))
+    for begin in begins.tolist():
+        end = int(ends[np.searchsorted(ends, begin)])
+        if end == len(so) or times[end] - times[begin] >= GOES_ON_S:
+            return float(times[begin])
+    return inf
 
 
 def rows(outcomes: Sequence[Outcome]) -> Iterator[list[str]]:
@@ -232,6 +264,7 @@ def rows(outcomes: Sequence[Outcome]) -> Iterator[list[str]]:
         slower = f', {way[3]:g} Hz' if way[3] != TickParameters.control_rate else ''
         yield [way[0], ('lock-step' if way[1] else 'real') + slower, 'yes' if way[2] else 'no',
                str(len(own)), str(len(kills)), str(sum(one.fell for one in own)),
+               str(sum(kill.stood for kill in kills)) if way[2] else '',
                f'{len(again)} of {len(kills)}' if way[2] else '',
                _spread([kill.cycles(kill.in_phase_s) for kill in again]),
                _spread([kill.cycles(kill.as_fast_s) for kill in fast]), _spread(seconds),

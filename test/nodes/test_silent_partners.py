@@ -443,9 +443,11 @@ def test_oscillators_and_reference_that_come_back_in_time_go_on_in_phase(
         node.start()
         sent: list[Any] = []
         node._publisher.publish = sent.append
-        node.on_tick(stamp - TICK, {**inputs, 'inhibition_gains': (stamp, ACTS)})
+        node.on_tick(stamp - 2 * TICK, {**inputs, 'inhibition_gains': (stamp, ACTS)})
         assert not sent  # the memory may come after the first tick
         node._memory._kept.append(message)
+        node.on_tick(stamp - TICK, {**inputs, 'inhibition_gains': None})
+        assert not sent  # without gains it would be at rest
         node.elapsed = 0.0
         node.on_tick(stamp, {**inputs, 'inhibition_gains': (stamp, ACTS)})
     off = np.abs(canonical._state.x - then.x).max()

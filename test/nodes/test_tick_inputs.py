@@ -181,6 +181,19 @@ def test_a_node_that_stalls_costs_no_tick_its_inputs(late: str, stalls: list[int
         assert set(values.values()) == {stamp // TICK}
 
 
+@pytest.mark.parametrize('behind', [HOLD_TICKS, 40, PENDING_TICKS - 2])
+def test_a_trigger_that_is_late_finds_the_inputs_of_its_own_ticks(behind: int) -> None:
+    """As where the trigger's writer was started again on a full machine."""
+    inputs, fired = recorder()
+    for tick in range(200):
+        for name in INPUTS[1:]:
+            inputs.add(name, tick * TICK, tick)
+        if tick >= 100 + behind:
+            inputs.add('a', (tick - behind) * TICK, tick - behind)
+    assert [stamp // TICK for stamp, _ in fired] == list(range(100, 200 - behind))
+    assert all(set(values.values()) == {stamp // TICK} for stamp, values in fired)
+
+
 def test_an_optional_input_may_never_come_but_others_must() -> None:
     inputs, fired = recorder(optional=('c',))
     for tick in range(6):

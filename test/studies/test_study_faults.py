@@ -79,4 +79,52 @@ def test_phase_and_speed_are_told_apart_and_a_fall_is_seen(
     assert forestalled.in_phase_s == inf  # before the robot followed, the next one was killed
     assert last.in_phase_s == pytest.approx(7.0, abs=0.01)
     (row,) = study_faults.rows([outcome])
-    assert row[:7] == ['amble', 'real', 'yes', '1', '3', str(int(fell)), '2 of 3']
+    assert row[:8] == ['amble', 'real', 'yes', '1', '3', str(int(fell)), '0', '2 of 3']
+
+
+def test_who_turns_in_phase_for_a_moment_only_is_not_in_phase_again(
+        monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(study_faults, 'load_recording', lambda _: recording(
+        'amble', (4.0, 5.0), (4.0, 5.0), False))
+    kills = [study_faults.Kill('canonical_oscillators', 3.0, back_s=3.2),
+             study_faults.Kill('inhibition', 8.0, back_s=8.5)]
+    outcome = study_faults.Outcome('amble', False, True, 0, kills=kills)
+    study_faults._judge(outcome, 0.5, tmp_path)
+    assert kills[0].in_phase_s == pytest.approx(5.0, abs=0.01)  # and not 3.2
+    assert kills[0].cycles(kills[0].in_phase_s) == pytest.approx(3.6, abs=0.1)
+    assert kills[1].in_phase_s == pytest.approx(8.5, abs=0.01)  # as far as is known
+
+
+class Told(Stuck):
+    """A walk of which a robot came to a stand by itself after its first death."""
+
+    lines = ['   1.00 s  walking\n', '   3.00 s  inhibition was ended by signal 9\n',
+             '   3.20 s  all nodes are ready again\n', '   3.90 s  the robot looks after itself\n']
+    deaths = iter((3.0, 8.0))
+
+    def said(self, pattern: str, begin: int = 0) -> float:
+        """Whatever is waited for comes."""
+        return next(self.deaths) if 'was ended' in pattern else 1.0
+
+    def told(self, pattern: str, begin: int = 0) -> list[float]:
+        """Times of the stands."""
+        return [3.9] if pattern == study_faults.STANDS else []
+
+    def pid_of(self, nodes: list[str]) -> int:
+        """A process that is not signalled."""
+        return 1
+
+    def walks(self) -> bool:
+        """It does."""
+        return True
+
+
+def test_a_stand_is_told_with_the_death_before_it(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study_faults.WalkProcess, 'of', lambda *_, **__: Told())
+    for name in ('os.kill', 'time.sleep'):
+        monkeypatch.setattr(f'{study_faults.__name__}.{name}', lambda *_: None)
+    monkeypatch.setattr(study_faults, '_judge', lambda *_: None)
+    outcome = study_faults.run('amble', 0.5, False, True, ['inhibition', 'reference_filter'],
+                               random.Random(0), tmp_path)
+    assert [kill.stood for kill in outcome.kills] == [True, False]

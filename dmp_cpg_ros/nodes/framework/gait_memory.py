@@ -25,8 +25,8 @@ the robot has not moved, which waits; in real time the gait goes on without the 
 """
 
 PATIENT_NS = 300_000_000
-"""In real time: how long a node that may have been restarted waits for the memory [ns]. It is
-latched, and may come after the first tick.
+"""In real time: how long a node that may have been restarted waits for the memory, and for the
+gains without which it would be at rest [ns]. They are latched, and may come after the first tick.
 """
 
 LOCK_STEP_S, LOOK_EVERY_S = 2.0, 0.1
@@ -78,7 +78,8 @@ class GaitMemory:
                 now_s < self._until_s and (not self._kept or not gains or gains[0] < acting_ns))
             self._held = (stamp_ns, values) if waits else None
             return waits
-        if self._kept or not self._node.return_ns:
+        if not self._node.return_ns or (
+                self._kept and values.get('inhibition_gains') is not None):
             return False
         if self._began_ns < 0:
             self._began_ns = stamp_ns

@@ -24,8 +24,10 @@ CONFIRMED = 3
 believed.
 """
 
-PENDING_TICKS = 16
-"""Ticks that may be incomplete at one time; older ones are forgotten."""
+PENDING_TICKS = 64
+"""Ticks that may be incomplete at one time; older ones are forgotten. What a trigger that is late
+finds gone is replaced by what came later: sensors that bear another stamp count as silent.
+"""
 
 PATIENCE = 3
 """In real time: ticks in a row that an input may miss before ticks stop waiting for it."""
