@@ -129,6 +129,8 @@ class AbsentLegs:
                 return False
             else:
                 targets[:, of], self._taken_ns[i] = going[:, of], 0
+                if self.rhythm is not None:
+                    self._memory.went_on(i, now, going[:, of])
         self.since_ns = min(filter(None, self._away_ns), default=0)
         return True
 

@@ -46,15 +46,29 @@ KEPT = 2048
 
 
 class LastCycle:
-    """Memory of the targets of four legs."""
+    """Memory of the targets of four legs, and of what their joints did instead while these were
+    away: who is back has the rhythm of before with which to go on, should he be away again.
+    """
 
     def __init__(self) -> None:
         """Start without any."""
         self._heard: list[deque[tuple[int, Array]]] = [deque(maxlen=KEPT) for _ in LEGS]
+        self._done: list[deque[tuple[int, Array]]] = [deque(maxlen=KEPT) for _ in LEGS]
 
     def accept(self, place: int, stamp_ns: int, targets: JointTargets) -> None:
-        """Remember the targets of one leg."""
-        self._heard[place].append((stamp_ns, np.array(tuple(vars(targets).values()))))
+        """Remember the targets of one leg, in the place of what it did from their time on."""
+        entry = stamp_ns, np.array(tuple(vars(targets).values()))
+        done = self._done[place]
+        while done and done[-1][0] >= stamp_ns:
+            done.pop()
+        done.append(entry)
+        self._heard[place].append(entry)
+
+    def went_on(self, place: int, time_ns: int, values: Array) -> None:
+        """Remember with what (3, 3) the joints of a leg that is away went on."""
+        done = self._done[place]
+        if done and done[-1][0] < time_ns:
+            done.append((time_ns, values.copy()))
 
     def acting(self, place: int, time_ns: int) -> tuple[int, Array] | None:
         """Stamp and values (3, 3) of a leg's newest targets up to a time, else of its first ones;
@@ -68,18 +82,18 @@ class LastCycle:
         """Rhythm of the last targets up to the last that all legs sent; None where they have
         none.
         """
-        if not all(self._heard):
+        if not all(self._done):
             return None
-        end_ns = min(heard[-1][0] for heard in self._heard)
+        end_ns = min(done[-1][0] for done in self._done)
         begin_ns = end_ns - round((LONGEST_S + END_S) * 1e9)
-        begin_ns = max(begin_ns, *(_unbroken_since(heard, begin_ns) for heard in self._heard))
+        begin_ns = max(begin_ns, *(_unbroken_since(done, begin_ns) for done in self._done))
         count = round((end_ns - begin_ns) * 1e-9 / GRID_S)
         compared, first = round(END_S / GRID_S), round(SHORTEST_S / GRID_S)
         if count < first + compared:
             return None
         times = GRID_S * np.arange(-count, 1, dtype=np.float64)
-        memory = np.concatenate([_sampled(_since(heard, end_ns - round(1e9 * GRID_S * count)),
-                                          end_ns, times) for heard in self._heard], axis=2)
+        memory = np.concatenate([_sampled(_since(done, end_ns - round(1e9 * GRID_S * count)),
+                                          end_ns, times) for done in self._done], axis=2)
         position = memory[:, 0]
         spread = position[-first:].var(axis=0).sum()
         lags = np.arange(first, count - compared + 1)

@@ -244,7 +244,9 @@ class KilledWalk(StarvedWalk):
         elif self._dead >= 0 and now_ns >= self._until_it_lives_ns:
             self.loop.leg_states[self._dead] = self.loop.legs[self._dead].picked_up(
                 tick.gait, tick.x, tick.x_dot, tick.r, tick.feedback)
+            targets = super().acting(tick)  # this tick's were those of the leg that has died
             self._dead, self._dies_ns = -1, now_ns + round(1e9 * draw(0.3, 3.0))
+            return targets
         return super().acting(tick)
 
     def arrives_ns(self, i: int, now_ns: int, first: bool) -> int | None:

@@ -17,6 +17,7 @@ import argparse
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -301,6 +302,8 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
                         outcomes.append(run(
                             gait, speed, lock_step, respawn, wanted, rng, folder, tell,
                             options.rate))
+                        if outcomes[-1].fell and options.logs:
+                            shutil.copytree(folder / 'run', options.logs / f'fell_{folder.name}')
                     print(f'round {round_}: {json.dumps(asdict(outcomes[-1]))}', flush=True)
                     write_results(options.json, [asdict(one) for one in outcomes])
     print(markdown_table(COLUMNS, list(rows(outcomes))))

@@ -76,6 +76,36 @@ def test_a_leg_that_is_away_goes_on_in_time_with_the_others(faster: float) -> No
     assert np.allclose(given, wanted)
 
 
+@pytest.mark.parametrize('back', [30, 200])
+def test_a_leg_that_is_away_once_more_has_the_rhythm_of_before(back: int) -> None:
+    """Of its targets there are none of one period in a row."""
+    legs = Legs()
+    for _ in range(500):
+        legs.step()
+    for _ in range(2):
+        for _ in range(100):
+            legs.step(dead=True)
+        for _ in range(back):
+            given, wanted = legs.step()
+        assert not legs.absent.since_ns and np.abs(given - wanted).max() < 0.06
+    for _ in range(100):
+        given, wanted = legs.step(dead=True)
+        assert legs.absent.rhythm is not None and np.abs(given - wanted).max() < 0.15
+
+
+def test_what_is_heard_late_takes_the_place_of_what_was_done_meanwhile() -> None:
+    memory = remembered(np.zeros((10, 12)))
+    for tick in range(11, 15):
+        memory.went_on(DEAD, tick * TICK_NS, np.ones((3, 3)))
+    memory.accept(DEAD, 12 * TICK_NS, JointTargets(*np.full((3, 3), 2.0)))
+    memory.went_on(DEAD, 12 * TICK_NS, np.ones((3, 3)))  # is heard already
+    memory.went_on(DEAD, 13 * TICK_NS, np.ones((3, 3)))
+    done = [(stamp // TICK_NS, float(value[0, 0])) for stamp, value in memory._done[DEAD]]
+    assert done[-4:] == [(10, 0.0), (11, 1.0), (12, 2.0), (13, 1.0)]
+    stamp, newest = memory.acting(DEAD, 20 * TICK_NS)
+    assert (stamp // TICK_NS, newest[0, 0]) == (12, 2.0)
+
+
 def remembered(position: Array) -> LastCycle:
     """Memory of positions (n, 12), one for each tick."""
     memory, rates = LastCycle(), np.gradient(position, TICK_NS * 1e-9, axis=0)
