@@ -28,6 +28,11 @@ from dmp_cpg_ros.suite_table import KINDS, LEG
 FEEDBACK_NS = 60_000_000
 """Age of the newest ``posture_feedback`` from which a leg does without, and says nothing [ns]."""
 
+AWAY_NS = 200_000_000
+"""Time without saying anything after which a leg begins anew where its joints are [ns]; sooner the
+robot would take what it says then for a jump from what it said last (``target_timeout``).
+"""
+
 NO_JOINTS = (np.full(len(JOINT_NAMES), np.nan),) * 3
 """Measured joints where they are not read."""
 
@@ -52,7 +57,7 @@ class LegTransformation(SuiteNode):
         gaits, description = known_gaits(self), description_of(self)
         self._leg = LegControl(
             leg, description, parameters, Movements(description), load_motion(parameters.motion))
-        self._state, self._joined = self._leg.initial_state(), False
+        self._state, self._joined, self._said_ns = self._leg.initial_state(), False, 0
         self._writer = JointTargetsWriter(leg, description.joint_names)
         self._publisher = self.publisher('joint_targets')
         readers: dict[str, Callable[[Any], Any]] = {
@@ -77,8 +82,11 @@ class LegTransformation(SuiteNode):
         elapsed = self.elapsed
         if self.health.has_problem('feedback'):
             self.clear('feedback')
+            silent_ns = stamp_ns - self._said_ns
             if not feedback.command.balanced:  # the drives may have moved the joints meanwhile
                 self._state, elapsed = self._leg.initial_state(), 0.0
+            elif 0 <= silent_ns <= AWAY_NS:
+                elapsed = 1e-9 * silent_ns
             elif self.return_ns:
                 self._joined = False
         if not self._joined:
@@ -89,7 +97,7 @@ class LegTransformation(SuiteNode):
             self._state, gait, x, x_dot, values['reference'], feedback, position, velocity,
             elapsed)
         message = self._writer.fill(stamp_ns, targets)  # refuses what is not finite
-        self._state = state
+        self._state, self._said_ns = state, stamp_ns
         self._publisher.publish(message)
 
     def diagnostic_values(self) -> Mapping[str, Any]:

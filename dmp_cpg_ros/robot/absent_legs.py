@@ -75,19 +75,22 @@ class AbsentLegs:
         self.since_ns = 0
         self._late_ns, self._away_ns = [0] * len(LEGS), [0] * len(LEGS)
 
-    def look(self) -> None:
-        """Look for the rhythm, while nobody is away."""
-        self.rhythm = self._memory.rhythm()
+    def look(self, *, alone: bool = False) -> None:
+        """Look for the rhythm, while nobody is away; for a leg alone, also for that of before."""
+        self.rhythm = self._memory.rhythm(alone=alone)
 
     def watch(self, now: int, ages: list[int]) -> None:
         """Note who is late, by the ages of the legs' targets [ns]; two, whose controllers starve,
         take the others with them: what these do for two that are elsewhere throws a trot over.
         """
         late = [age > CARRIED_NS for age in ages]
+        alone = sum(late) == 1
+        if not alone and self.rhythm is not None and self.rhythm.of_before:
+            self.rhythm = None
         for i, so in enumerate(late):
-            if so or sum(late) > 1:
+            if so or not alone:
                 if not self.since_ns:
-                    self.look()
+                    self.look(alone=alone)
                 self._late_ns[i] = now
                 self._away_ns[i] = self._away_ns[i] or now
                 self.since_ns = self.since_ns or now

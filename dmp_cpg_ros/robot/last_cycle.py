@@ -4,7 +4,10 @@
 
 A steady gait is a limit cycle, so its last period is all that is left to know of it: the targets
 a time t after the last ones are those of a period T before, q_d(t) = q_d(t − T). T is the lag at
-which the memory resembles its own end most.
+which the memory resembles its own end most. A robot that was disturbed a moment ago returns to the
+cycle that it had; where it has no other rhythm a leg alone takes that one up, at the phase that is
+nearest. All legs with it would not balance: of six trots whose legs were all silent for half a
+second, again and again, two fell.
 """
 
 from __future__ import annotations
@@ -30,6 +33,11 @@ whose legs died, those that were the gait's had 0.22 and 0.53 at most; what rese
 robot that speeds up by chance had 0.22 and 0.41, and 2.1 over its cycle.
 """
 
+KNOWN_NS, TAKEN_UP = 8_000_000_000, 0.2
+"""Time for which a cycle that was found is known [ns], and how little it may differ at its nearest
+phase from the end of the memory, as a share of its variance.
+"""
+
 GRID_S = 0.004
 """Time step of the memory [s]."""
 
@@ -40,6 +48,9 @@ faster or slower at most, and speed of joints below which their angles tell litt
 
 GAP_NS = 60_000_000
 """Time without targets of a leg that nothing is known of [ns]."""
+
+SHORTEST, COMPARED = round(SHORTEST_S / GRID_S), round(END_S / GRID_S)
+"""The same in steps of that."""
 
 KEPT = 2048
 """Targets of each leg that are remembered, at most."""
@@ -54,6 +65,7 @@ class LastCycle:
         """Start without any."""
         self._heard: list[deque[tuple[int, Array]]] = [deque(maxlen=KEPT) for _ in LEGS]
         self._done: list[deque[tuple[int, Array]]] = [deque(maxlen=KEPT) for _ in LEGS]
+        self._known: Rhythm | None = None
 
     def accept(self, place: int, stamp_ns: int, targets: JointTargets) -> None:
         """Remember the targets of one leg, in the place of what it did from their time on."""
@@ -78,9 +90,9 @@ class LastCycle:
         return next((entry for entry in reversed(heard) if entry[0] <= time_ns),
                     heard[0] if heard else None)
 
-    def rhythm(self) -> Rhythm | None:
+    def rhythm(self, *, alone: bool = False) -> Rhythm | None:
         """Rhythm of the last targets up to the last that all legs sent; None where they have
-        none.
+        none. For a leg alone, that of before will do, at the phase that is nearest to them.
         """
         if not all(self._done):
             return None
@@ -88,29 +100,18 @@ class LastCycle:
         begin_ns = end_ns - round((LONGEST_S + END_S) * 1e9)
         begin_ns = max(begin_ns, *(_unbroken_since(done, begin_ns) for done in self._done))
         count = round((end_ns - begin_ns) * 1e-9 / GRID_S)
-        compared, first = round(END_S / GRID_S), round(SHORTEST_S / GRID_S)
-        if count < first + compared:
+        if count < COMPARED:
             return None
         times = GRID_S * np.arange(-count, 1, dtype=np.float64)
         memory = np.concatenate([_sampled(_since(done, end_ns - round(1e9 * GRID_S * count)),
                                           end_ns, times) for done in self._done], axis=2)
-        position = memory[:, 0]
-        spread = position[-first:].var(axis=0).sum()
-        lags = np.arange(first, count - compared + 1)
-        parts = np.lib.stride_tricks.sliding_window_view(position, compared, axis=0)
-        off = ((parts[-1] - parts[-1 - lags]) ** 2).sum(axis=1).mean(axis=1)
-        least = off.min()
-        # the first dip that is about as low: not twice the period
-        best = np.flatnonzero(off <= least + 0.02 * spread)[0]
-        while best + 1 < len(off) and off[best + 1] < off[best]:
-            best += 1
-        lag = int(lags[best])
-        wide = min(lag, count - lag)
-        cycle = ((position[-wide:] - position[-wide - lag:-lag]) ** 2).sum(axis=1).mean()
-        alike = ALIKE if 2 * wide >= lag else CLOSELY
-        if not (least <= alike * spread and cycle <= REPEATS * spread):
+        lag, known = _period(memory[:, 0]), self._known
+        if lag:
+            self._known = Rhythm(end_ns, memory[-lag - 1:])
+            return self._known
+        if known is None or not alone or end_ns - known.end_ns > KNOWN_NS:
             return None
-        return Rhythm(end_ns, memory[-lag - 1:])
+        return known.from_phase_of(memory[-COMPARED:], end_ns)
 
 
 class Rhythm:
@@ -122,14 +123,37 @@ class Rhythm:
         Stamp of the last of them [ns].
     memory : ndarray (n + 1, 3, 12)
         Position, velocity and effort of one period, both ends included.
+    last : ndarray (3, 12), optional
+        The last targets, where the memory is one of before; default: its end.
+
+    Attributes
+    ----------
+    of_before : bool
+        Whether it is the cycle of before a disturbance, and not that of the last targets.
     """
 
-    def __init__(self, end_ns: int, memory: Array) -> None:
-        """Keep one period, and by how much its ends differ."""
+    def __init__(self, end_ns: int, memory: Array, last: Array | None = None) -> None:
+        """Keep one period, and by how much it differs from where it begins."""
         self.end_ns, self._memory = end_ns, memory
-        self._ahead_s, self._kept_ns = 0.0, end_ns
+        self._ahead_s, self._kept_ns, self.of_before = 0.0, end_ns, last is not None
         self.period_s = GRID_S * (len(memory) - 1)
-        self._gap = memory[-1] - memory[0]
+        self._gap = (memory[-1] if last is None else last) - memory[0]
+
+    def from_phase_of(self, end: Array, end_ns: int) -> Rhythm | None:
+        """The same, closed to a cycle, as what follows an end (m, 3, 12) of a memory; None where
+        no phase resembles that.
+        """
+        steps = len(self._memory) - 1
+        share = np.arange(steps)[:, None, None] / steps
+        cycle = self._memory[:-1] - share * (self._memory[-1] - self._memory[0])
+        position = cycle[:, 0]
+        places = (np.arange(steps)[:, None] + np.arange(1 - len(end), 1)) % steps
+        off = ((position[places] - end[:, 0]) ** 2).sum(axis=2).mean(axis=1)
+        best = int(off.argmin())
+        if off[best] > TAKEN_UP * position.var(axis=0).sum():
+            return None
+        turned = np.roll(cycle, -best, axis=0)
+        return Rhythm(end_ns, np.concatenate((turned, turned[:1])), end[-1])
 
     def at(self, time_ns: int) -> Array:
         """Targets (3, 12) at a stamp after the end; the ends' difference fades within a period."""
@@ -151,6 +175,27 @@ class Rhythm:
             pull += float(velocity @ (told - position[of]))
             power += float(velocity @ velocity)
         self._ahead_s += dt * min(max(pull / (KEEPING_S * power), -KEEPS), KEEPS)
+
+
+def _period(position: Array) -> int:
+    """Steps of the lag at which positions (n, 12) resemble their own end; 0 where none does."""
+    count = len(position) - 1
+    if count < SHORTEST + COMPARED:
+        return 0
+    spread = position[-SHORTEST:].var(axis=0).sum()
+    lags = np.arange(SHORTEST, count - COMPARED + 1)
+    parts = np.lib.stride_tricks.sliding_window_view(position, COMPARED, axis=0)
+    off = ((parts[-1] - parts[-1 - lags]) ** 2).sum(axis=1).mean(axis=1)
+    least = off.min()
+    # the first dip that is about as low: not twice the period
+    best = np.flatnonzero(off <= least + 0.02 * spread)[0]
+    while best + 1 < len(off) and off[best + 1] < off[best]:
+        best += 1
+    lag = int(lags[best])
+    wide = min(lag, count - lag)
+    cycle = ((position[-wide:] - position[-wide - lag:-lag]) ** 2).sum(axis=1).mean()
+    alike = ALIKE if 2 * wide >= lag else CLOSELY
+    return lag if least <= alike * spread and cycle <= REPEATS * spread else 0
 
 
 def _unbroken_since(heard: deque[tuple[int, Array]], begin_ns: int) -> int:

@@ -24,7 +24,7 @@ from dmp_cpg_ros.core.balance.body_command import BodyCommand
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.core.loop import WalkingLoop
-from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.nodes import posture_control
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework import gait_memory, parameter_follower
@@ -33,7 +33,7 @@ from dmp_cpg_ros.nodes.framework.known_stop import BRIEF_NS, PATIENT_NS
 from dmp_cpg_ros.nodes.framework.told_stop import HEARTBEAT_NS
 from dmp_cpg_ros.nodes.framework.waiting_requests import PATIENCE_NS
 from dmp_cpg_ros.nodes.inhibition import InhibitionNode
-from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
+from dmp_cpg_ros.nodes.leg_transformation import FEEDBACK_NS, LegTransformation
 from dmp_cpg_ros.nodes.messages.canonical_state import GaitMemoryWriter
 from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import BLIND_NS, SILENT_NS
@@ -43,6 +43,7 @@ from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
 from dmp_cpg_ros.nodes.posture_control import PostureControl
 from dmp_cpg_ros.nodes.reference_filter import ReferenceFilter
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
+from dmp_cpg_ros.robot.target_watch import TargetWatch
 from dmp_cpg_ros.suite import load_gaits, load_suite
 from dmp_cpg_ros.suite_table import RETURN_S, ROBOT
 
@@ -637,6 +638,33 @@ def test_a_leg_that_was_without_feedback_on_the_way_up_goes_on_from_where_its_jo
             'posture_feedback': (state.time_ns - age, feedback)})
         leg.elapsed = TICK * 1e-9
     np.testing.assert_array_equal(sent, (high[:3], low[:3]))
+
+
+@pytest.mark.parametrize('silent', [1, 5, 20, 45])
+def test_a_leg_that_was_silent_for_a_moment_goes_on_without_a_jump(ros: Ros, silent: int) -> None:
+    """Late feedback makes it silent now and then; who begins anew each time is not believed."""
+    description = load_description(SUITE.robot_file)
+    loop, state, _ = walked(500)
+    robot = PerfectTrackingRobot(description, TICK, 'standing')
+    state, sent = robot.reset(state.time_ns), list[tuple[int, Any]]()
+    leg = LegTransformation('leg_transformation_fl', context=ros.context,
+                            parameter_overrides=RETURNS)
+    ros.nodes.append(leg)
+    leg.start()
+    leg._writer.fill = lambda stamp, targets: sent.append((stamp, JointTargets(
+        *map(np.array, (targets.position, targets.velocity, targets.effort)))))
+    leg._publisher.publish = str
+    watch = TargetWatch(description.legs[0], 200_000_000)
+    for k in range(200):
+        tick, stamp = loop.tick(state), state.time_ns
+        late_ns = FEEDBACK_NS + TICK if 60 <= k < 60 + silent or 130 <= k < 130 + silent else 0
+        leg.elapsed = TICK * 1e-9
+        leg.on_tick(stamp, {
+            'canonical_state': (tick.x, tick.x_dot, tick.gait), 'reference': tick.r,
+            'posture_feedback': (stamp - late_ns, tick.feedback)})
+        state = robot.step(tick.targets)
+    assert len(sent) == 200 - 2 * silent
+    assert all(watch.believes(*entry) for entry in sent)
 
 
 def test_a_posture_control_that_comes_back_begins_with_the_readings_of_one_tick(ros: Ros) -> None:

@@ -134,3 +134,42 @@ def test_a_gait_that_balances_has_its_rhythm_and_what_resembles_its_end_by_chanc
     again, apart = 25, 176
     other[-again - 1:] = other[-again - 1 - apart:-apart]
     assert remembered(other).rhythm() is None
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_after_a_disturbance_a_leg_alone_has_the_cycle_of_before_at_its_phase(seed: int) -> None:
+    """Its period is not a whole number of steps of the memory."""
+    random, period = np.random.default_rng(seed), PERIOD_S / (TICK_NS * 1e-9)
+    lag, count = random.uniform(size=12), 500 + int(random.integers(200))
+    gait = np.sin(tau * (np.arange(4000)[:, None] / period + lag))
+    walked = gait[:count].copy()
+    blow = slice(count - 260, count - 30)
+    walked[blow] += 1.5 * np.hanning(230)[:, None] * smooth(seed, 230)
+    memory = remembered(walked[:count - 260])
+    assert not memory.rhythm().of_before
+    rest = remembered(walked)
+    rest._known = memory._known
+    assert rest.rhythm() is None
+    rhythm = rest.rhythm(alone=True)
+    assert rhythm is not None and rhythm.of_before
+    assert np.abs(rhythm.at(count * TICK_NS)[0] - walked[-1]).max() < 1e-9
+    for ahead in range(int(period), 2 * int(period)):  # the difference has faded
+        expected = gait[count - 1 + ahead]
+        assert np.abs(rhythm.at((count + ahead) * TICK_NS)[0] - expected).max() < 0.2
+    with_all = AbsentLegs(rest, 1_000_000_000)
+    with_all.watch(count * TICK_NS, [CARRIED_NS + 1, 0, 0, 0])
+    assert with_all.rhythm is not None
+    with_all.watch(count * TICK_NS, [CARRIED_NS + 1] * 4)
+    assert with_all.rhythm is None
+    later = remembered(np.concatenate((walked, smooth(seed + 9, 2100))))
+    later._known = memory._known
+    assert later.rhythm(alone=True) is None
+
+
+def test_what_resembles_no_phase_of_the_cycle_of_before_has_no_rhythm() -> None:
+    turns = np.arange(500)[:, None] / (PERIOD_S / (TICK_NS * 1e-9))
+    memory = remembered(np.sin(tau * (turns + np.linspace(0.0, 1.0, 12))))
+    assert memory.rhythm() is not None
+    elsewhere = remembered(smooth(1, 500))
+    elsewhere._known = memory._known
+    assert elsewhere.rhythm(alone=True) is None
