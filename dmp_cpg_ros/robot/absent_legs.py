@@ -25,6 +25,11 @@ IN_TIME_NS = 60_000_000
 that come now and then only tell what was, and to follow them each time tears at the feet.
 """
 
+SEVERAL_NS = 100_000_000
+"""Time for which several legs may go on with the cycle of before a disturbance [ns]: they do not
+balance with it.
+"""
+
 IN_STEP_NS = 200_000_000
 """Least time that legs have, which are in time again, until the rhythm is in step with them [ns].
 """
@@ -72,7 +77,7 @@ class AbsentLegs:
 
     def all_here(self) -> None:
         """Forget who has been away."""
-        self.since_ns = 0
+        self.since_ns, self._several = 0, (0, -IN_TIME_NS)
         self._late_ns, self._away_ns = [0] * len(LEGS), [0] * len(LEGS)
 
     def look(self, *, alone: bool = False) -> None:
@@ -85,12 +90,14 @@ class AbsentLegs:
         """
         late = [age > CARRIED_NS for age in ages]
         alone = sum(late) == 1
-        if not alone and self.rhythm is not None and self.rhythm.of_before:
-            self.rhythm = None
+        if not self.since_ns:
+            self.look(alone=alone)
+        of_before = self.rhythm is not None and self.rhythm.of_before
+        if of_before and not alone:
+            since, last = self._several
+            self._several = since if now - last < IN_TIME_NS else now, now
         for i, so in enumerate(late):
-            if so or not alone:
-                if not self.since_ns:
-                    self.look(alone=alone)
+            if so or not (alone or of_before):
                 self._late_ns[i] = now
                 self._away_ns[i] = self._away_ns[i] or now
                 self.since_ns = self.since_ns or now
@@ -110,8 +117,11 @@ class AbsentLegs:
         Returns
         -------
         bool
-            False where one has been elsewhere for too long.
+            False where one has been elsewhere for too long, or several have nothing to go on with.
         """
+        since, last = self._several
+        if last == now > since + SEVERAL_NS:
+            return False
         in_time = [now - late_ns > IN_TIME_NS for late_ns in self._late_ns]
         here = [i for i, away_ns in enumerate(self._away_ns) if not away_ns] or [
             i for i, so in enumerate(in_time) if so]

@@ -11,7 +11,13 @@ import pytest
 
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
-from dmp_cpg_ros.robot.absent_legs import CARRIED_NS, IN_TIME_NS, JOINTS, AbsentLegs
+from dmp_cpg_ros.robot.absent_legs import (
+    CARRIED_NS,
+    IN_TIME_NS,
+    JOINTS,
+    SEVERAL_NS,
+    AbsentLegs,
+)
 from dmp_cpg_ros.robot.last_cycle import LastCycle
 
 TICK_NS, DEAD = 4_000_000, 0
@@ -156,11 +162,17 @@ def test_after_a_disturbance_a_leg_alone_has_the_cycle_of_before_at_its_phase(se
     for ahead in range(int(period), 2 * int(period)):  # the difference has faded
         expected = gait[count - 1 + ahead]
         assert np.abs(rhythm.at((count + ahead) * TICK_NS)[0] - expected).max() < 0.2
-    with_all = AbsentLegs(rest, 1_000_000_000)
-    with_all.watch(count * TICK_NS, [CARRIED_NS + 1, 0, 0, 0])
-    assert with_all.rhythm is not None
-    with_all.watch(count * TICK_NS, [CARRIED_NS + 1] * 4)
-    assert with_all.rhythm is None
+    absent, late = AbsentLegs(rest, 1_000_000_000), [CARRIED_NS + 1, 0, 0, 0]
+    for k in range(100):  # others are late too, first for a moment and then for longer
+        now, others = (count + k) * TICK_NS, 20 <= k < 30 or k >= 50
+        absent.watch(now, [CARRIED_NS + 1] * 4 if others else late)
+        assert absent.rhythm is not None and absent.rhythm.of_before
+        if not absent.go_on(now, np.zeros((3, 12)), np.zeros(12)):
+            break
+    assert k == 50 + SEVERAL_NS // TICK_NS + 1
+    absent = AbsentLegs(rest, 1_000_000_000)
+    absent.watch(count * TICK_NS, [CARRIED_NS + 1] * 4)
+    assert absent.rhythm is None
     later = remembered(np.concatenate((walked, smooth(seed + 9, 2100))))
     later._known = memory._known
     assert later.rhythm(alone=True) is None
