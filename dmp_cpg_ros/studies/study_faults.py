@@ -85,8 +85,8 @@ class Kill:
         When the robot, which had looked after itself, followed its legs again [s].
     period_s : float
         Of the gait [s].
-    stood : bool
-        Whether the robot came to a stand by itself after it.
+    stood : bool or None
+        Whether the robot came to a stand by itself after it; None: unknown.
     unrecorded_s : float
         Of the recorder: time before the kill that is not in its bag [s].
     gaps : int
@@ -100,7 +100,7 @@ class Kill:
     in_phase_s: float = inf
     as_fast_s: float = inf
     period_s: float = nan
-    stood: bool = False
+    stood: bool | None = None
     unrecorded_s: float = nan
     gaps: int = 0
 
@@ -265,7 +265,7 @@ def rows(outcomes: Sequence[Outcome]) -> Iterator[list[str]]:
         slower = f', {way[3]:g} Hz' if way[3] != TickParameters.control_rate else ''
         yield [way[0], ('lock-step' if way[1] else 'real') + slower, 'yes' if way[2] else 'no',
                str(len(own)), str(len(kills)), str(sum(one.fell for one in own)),
-               str(sum(kill.stood for kill in kills)) if way[2] else '',
+               _stands(kills) if way[2] else '',
                f'{len(again)} of {len(kills)}' if way[2] else '',
                _spread([kill.cycles(kill.in_phase_s) for kill in again]),
                _spread([kill.cycles(kill.as_fast_s) for kill in fast]), _spread(seconds),
@@ -273,6 +273,11 @@ def rows(outcomes: Sequence[Outcome]) -> Iterator[list[str]]:
                    f', unknown {ends.count("unknown")}' if 'unknown' in ends else ''),
                f'{_spread([bag.unrecorded_s for bag in bags])}; {sum(bag.gaps for bag in bags)}'
                if bags else '']
+
+
+def _stands(kills: Sequence[Kill]) -> str:
+    stood = [kill.stood for kill in kills if kill.stood is not None]
+    return f'{sum(stood)} of {len(stood)}' if stood else 'unknown'
 
 
 def _spread(values: Sequence[float]) -> str:

@@ -79,7 +79,7 @@ def test_phase_and_speed_are_told_apart_and_a_fall_is_seen(
     assert forestalled.in_phase_s == inf  # before the robot followed, the next one was killed
     assert last.in_phase_s == pytest.approx(7.0, abs=0.01)
     (row,) = study_faults.rows([outcome])
-    assert row[:8] == ['amble', 'real', 'yes', '1', '3', str(int(fell)), '0', '2 of 3']
+    assert row[:8] == ['amble', 'real', 'yes', '1', '3', str(int(fell)), 'unknown', '2 of 3']
 
 
 def test_who_turns_in_phase_for_a_moment_only_is_not_in_phase_again(
@@ -128,3 +128,5 @@ def test_a_stand_is_told_with_the_death_before_it(
     outcome = study_faults.run('amble', 0.5, False, True, ['inhibition', 'reference_filter'],
                                random.Random(0), tmp_path)
     assert [kill.stood for kill in outcome.kills] == [True, False]
+    (row,) = study_faults.rows([outcome])
+    assert row[6] == '1 of 2'
