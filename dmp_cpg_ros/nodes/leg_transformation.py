@@ -12,7 +12,7 @@ import numpy as np
 from dmp_cpg_ros.core.modes.leg_control import LegControl
 from dmp_cpg_ros.core.modes.motion_library import Movements
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
-from dmp_cpg_ros.core.suite_parameters import LegChoice
+from dmp_cpg_ros.core.suite_parameters import LegChoice, RobotParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known_gaits
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
@@ -28,9 +28,9 @@ from dmp_cpg_ros.suite_table import KINDS, LEG
 FEEDBACK_NS = 60_000_000
 """Age of the newest ``posture_feedback`` from which a leg does without, and says nothing [ns]."""
 
-AWAY_NS = 200_000_000
+AWAY_NS = round(1e9 * RobotParameters().target_timeout)
 """Time without saying anything after which a leg begins anew where its joints are [ns]; sooner the
-robot would take what it says then for a jump from what it said last (``target_timeout``).
+robot takes what it says then for a jump from what it said last.
 """
 
 NO_JOINTS = (np.full(len(JOINT_NAMES), np.nan),) * 3

@@ -33,7 +33,7 @@ whose legs died, those that were the gait's had 0.22 and 0.53 at most; what rese
 robot that speeds up by chance had 0.22 and 0.41, and 2.1 over its cycle.
 """
 
-KNOWN_NS, TAKEN_UP = 8_000_000_000, 0.2
+KNOWN_NS, NEAREST = 8_000_000_000, 0.2
 """Time for which a cycle that was found is known [ns], and how little it may differ at its nearest
 phase from the end of the memory, as a share of its variance.
 """
@@ -58,7 +58,7 @@ KEPT = 2048
 
 class LastCycle:
     """Memory of the targets of four legs, and of what their joints did instead while these were
-    away: who is back has the rhythm of before with which to go on, should he be away again.
+    away: a leg that is back has the rhythm of before with which to go on, should it be away again.
     """
 
     def __init__(self) -> None:
@@ -150,7 +150,7 @@ class Rhythm:
         places = (np.arange(steps)[:, None] + np.arange(1 - len(end), 1)) % steps
         off = ((position[places] - end[:, 0]) ** 2).sum(axis=2).mean(axis=1)
         best = int(off.argmin())
-        if off[best] > TAKEN_UP * position.var(axis=0).sum():
+        if off[best] > NEAREST * position.var(axis=0).sum():
             return None
         turned = np.roll(cycle, -best, axis=0)
         return Rhythm(end_ns, np.concatenate((turned, turned[:1])), end[-1])

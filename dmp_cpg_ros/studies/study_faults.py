@@ -8,7 +8,7 @@ fast again when the body has half of its speed besides. The cycles until then co
 at which the robot follows its legs again, or at which all nodes are ready, whichever is earlier. A
 recorder that is killed leaves a bag that nobody has closed: what is told is how much of the time
 before the kill is not in it, and how many ticks are missing within. Exit status 1 when a robot
-fell.
+fell, whose recording --logs keeps.
 """
 
 from __future__ import annotations

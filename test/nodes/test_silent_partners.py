@@ -33,7 +33,7 @@ from dmp_cpg_ros.nodes.framework.known_stop import BRIEF_NS, PATIENT_NS
 from dmp_cpg_ros.nodes.framework.told_stop import HEARTBEAT_NS
 from dmp_cpg_ros.nodes.framework.waiting_requests import PATIENCE_NS
 from dmp_cpg_ros.nodes.inhibition import InhibitionNode
-from dmp_cpg_ros.nodes.leg_transformation import FEEDBACK_NS, LegTransformation
+from dmp_cpg_ros.nodes.leg_transformation import AWAY_NS, FEEDBACK_NS, LegTransformation
 from dmp_cpg_ros.nodes.messages.canonical_state import GaitMemoryWriter
 from dmp_cpg_ros.nodes.messages.inhibition import InhibitionGainsReader, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import BLIND_NS, SILENT_NS
@@ -654,7 +654,7 @@ def test_a_leg_that_was_silent_for_a_moment_goes_on_without_a_jump(ros: Ros, sil
     leg._writer.fill = lambda stamp, targets: sent.append((stamp, JointTargets(
         *map(np.array, (targets.position, targets.velocity, targets.effort)))))
     leg._publisher.publish = str
-    watch = TargetWatch(description.legs[0], 200_000_000)
+    watch = TargetWatch(description.legs[0], AWAY_NS)
     for k in range(200):
         tick, stamp = loop.tick(state), state.time_ns
         late_ns = FEEDBACK_NS + TICK if 60 <= k < 60 + silent or 130 <= k < 130 + silent else 0

@@ -18,7 +18,7 @@ from dmp_cpg_ros.robot.absent_legs import (
     SEVERAL_NS,
     AbsentLegs,
 )
-from dmp_cpg_ros.robot.last_cycle import LastCycle
+from dmp_cpg_ros.robot.last_cycle import KNOWN_NS, LastCycle
 
 TICK_NS, DEAD = 4_000_000, 0
 PERIOD_S = 0.42
@@ -97,6 +97,7 @@ def test_a_leg_that_is_away_once_more_has_the_rhythm_of_before(back: int) -> Non
     for _ in range(100):
         given, wanted = legs.step(dead=True)
         assert legs.absent.rhythm is not None and np.abs(given - wanted).max() < 0.15
+        assert not legs.absent.rhythm.of_before
 
 
 def test_what_is_heard_late_takes_the_place_of_what_was_done_meanwhile() -> None:
@@ -162,20 +163,21 @@ def test_after_a_disturbance_a_leg_alone_has_the_cycle_of_before_at_its_phase(se
     for ahead in range(int(period), 2 * int(period)):  # the difference has faded
         expected = gait[count - 1 + ahead]
         assert np.abs(rhythm.at((count + ahead) * TICK_NS)[0] - expected).max() < 0.2
+    absent = AbsentLegs(rest, 1_000_000_000)
+    absent.watch(count * TICK_NS, [CARRIED_NS + 1] * 4)
+    assert absent.rhythm is None
+    memory._known.end_ns -= KNOWN_NS
+    assert rest.rhythm(alone=True) is None  # that was too long ago
+    memory._known.end_ns += KNOWN_NS
     absent, late = AbsentLegs(rest, 1_000_000_000), [CARRIED_NS + 1, 0, 0, 0]
     for k in range(100):  # others are late too, first for a moment and then for longer
         now, others = (count + k) * TICK_NS, 20 <= k < 30 or k >= 50
-        absent.watch(now, [CARRIED_NS + 1] * 4 if others else late)
+        absent.watch(now, [CARRIED_NS + 1, CARRIED_NS + 1, 0, 0] if others else late)
         assert absent.rhythm is not None and absent.rhythm.of_before
         if not absent.go_on(now, np.zeros((3, 12)), np.zeros(12)):
             break
     assert k == 50 + SEVERAL_NS // TICK_NS + 1
-    absent = AbsentLegs(rest, 1_000_000_000)
-    absent.watch(count * TICK_NS, [CARRIED_NS + 1] * 4)
-    assert absent.rhythm is None
-    later = remembered(np.concatenate((walked, smooth(seed + 9, 2100))))
-    later._known = memory._known
-    assert later.rhythm(alone=True) is None
+    assert not any(absent._away_ns[2:])  # who is in time is followed
 
 
 def test_what_resembles_no_phase_of_the_cycle_of_before_has_no_rhythm() -> None:
