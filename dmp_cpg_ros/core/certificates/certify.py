@@ -24,7 +24,11 @@ from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.certificates import network as of_network
 from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, discharged, lost
 from dmp_cpg_ros.core.certificates.network import Setting
-from dmp_cpg_ros.core.certificates.step import step_inequalities, stepped_network
+from dmp_cpg_ros.core.certificates.step import (
+    cycle_inequalities,
+    step_inequalities,
+    stepped_network,
+)
 from dmp_cpg_ros.core.certificates.timing import LONGEST_STOP, time_to_rest, time_to_walking
 from dmp_cpg_ros.core.certificates.votes import vote_inequalities
 from dmp_cpg_ros.core.contraction import hierarchy
@@ -32,7 +36,6 @@ from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, PROVED
 from dmp_cpg_ros.core.contraction.hopf_bounds import transverse_rate
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, NONE, REGIONAL
-from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
 from dmp_cpg_ros.core.inhibition.entry import SMALLEST_RADIUS, eligible_legs
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, REST_ACTIVITY
 from dmp_cpg_ros.core.maths import Array
@@ -43,8 +46,10 @@ from dmp_cpg_ros.core.transformation.foot_path import FootPath
 BEFORE_VOTES = 'time_to_walking'
 """Name of the last row before those of votes."""
 
-OSCILLATOR_ROWS = (*of_network.NETWORK_ROWS, 'rest_radius')
-"""Names of required rows that depend on the oscillators alone, after which others may be missing.
+CLOSED_ROWS = 'cycle_radius', 'region_per_tick', 'reference', 'transformation', 'hierarchy'
+QUICK_ROWS = (*CLOSED_ROWS, *of_network.NETWORK_ROWS, 'rest_radius')
+"""Names of required rows that are closed formulas, and of all that take little, in the order in
+which they are looked at; after them others may be missing.
 """
 
 
@@ -66,7 +71,7 @@ def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = Fal
         Whether rows after a required one that does not hold may be missing: so it is known at a
         fraction of the cost that the certificate does not hold.
     until : str
-        Name of a row after which others may be missing: one of ``OSCILLATOR_ROWS`` or
+        Name of a row after which others may be missing: one of ``QUICK_ROWS`` or
         ``BEFORE_VOTES``.
 
     Returns
@@ -103,17 +108,20 @@ def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = Fal
 def _certificate(s: Setting, required_only: bool, until_lost: bool, until: str,
                  votes: Callable[[], list[Inequality]]) -> Certificate:
     p, network = s.network.parameters, s.network
+    quick = [*cycle_inequalities(s), *hierarchy_inequalities(s)]
+    if until in {row.name for row in quick} or (until_lost and lost(quick)):
+        return Certificate(tuple(quick), NONE, s.span.omega[1])
+    rows: list[Inequality] = []
     analysis = of_network.analyse_network(network, s.parameters.inhibition, s.span)
     found, contraction = analysis.found, analysis.contraction
-    rows: list[Inequality] = []
     for row in of_network.network_inequalities(s, analysis):
         rows.append(row)
         if row.name == until or (until_lost and not row.holds):
-            return Certificate(tuple(rows), contraction.reach, s.span.omega[1])
+            return Certificate((*quick, *rows), contraction.reach, s.span.omega[1])
     rest = analysis.rest
     at_rest = rest_inequalities(s, rest)
-    if until in OSCILLATOR_ROWS or (until_lost and not at_rest[-1].holds):
-        return Certificate((*rows, at_rest[-1]), contraction.reach, s.span.omega[1])
+    if until in QUICK_ROWS or (until_lost and not at_rest[-1].holds):
+        return Certificate((*quick, *rows, at_rest[-1]), contraction.reach, s.span.omega[1])
     rates = (found.rate, max(contraction.rate, analysis.capture.rate), 2.0 * p.rho * p.radius**2)
     slowest = min(rate for rate in rates if rate > 0.0)       # rates that there are to keep
     step, stop = None, time_to_rest(s, analysis.capture, rest)
@@ -126,7 +134,7 @@ def _certificate(s: Setting, required_only: bool, until_lost: bool, until: str,
     start = time_to_walking(s, found, rest)
     if not required_only:
         rows.append(of_network.capture_anywhere(s, analysis))
-    rows += [*step_inequalities(s, slowest, step), *hierarchy_inequalities(s, found), *at_rest]
+    rows += [*step_inequalities(s, slowest, step), *quick, *at_rest]
     if not required_only:
         rows.append(of_network.mismatch_inequality(s, found))
     contact = None
@@ -227,7 +235,7 @@ def spring_damper_contraction(stiffness: float, damping: float) -> tuple[float, 
     return rate, np.array([[s, 0.0], [half, 1.0]])
 
 
-def hierarchy_inequalities(s: Setting, found: Synchronisation) -> list[Inequality]:
+def hierarchy_inequalities(s: Setting) -> list[Inequality]:
     """Inequalities (e): rates of the driving and the driven systems, and Theorem 4 for the whole,
     with the synchronisation of the oscillators.
     """
@@ -240,7 +248,8 @@ def hierarchy_inequalities(s: Setting, found: Synchronisation) -> list[Inequalit
     alpha_r = s.parameters.reference.alpha_r
     whole = hierarchy.coupled_primitives(
         hierarchy.Part('reference', hierarchy.CONTRACTING, alpha_r),
-        hierarchy.Part('oscillator', hierarchy.TRANSVERSE, oscillator), found,
+        hierarchy.Part('oscillator', hierarchy.TRANSVERSE, oscillator),
+        of_network.free_synchronisation(s.network),
         [hierarchy.Part('swing filters', hierarchy.CONTRACTING, filters),
          hierarchy.Part('joints', hierarchy.CONTRACTING, spring)])
     return [

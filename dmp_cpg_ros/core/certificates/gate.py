@@ -14,7 +14,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.coupling import degrees
 from dmp_cpg_ros.core.canonical.inhibition import AUTO, Inhibition
-from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, OSCILLATOR_ROWS, certify
+from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, CLOSED_ROWS, QUICK_ROWS, certify
 from dmp_cpg_ros.core.certificates.changes import all_networks, certify_changes, votes_among
 from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, Look
 from dmp_cpg_ros.core.certificates.network import Setting
@@ -44,10 +44,10 @@ _CAPTURING = frozenset(('rho', 'radius', 'coupling_gain', 'coupling_graph', 'inh
                         'region_radius', 'inhibited_legs'))
 """Parameters that decide which set inhibition holds the legs in."""
 
-_WHOLE_EFFORT, _STOPPING_EFFORT, _WEAK_EFFORT = 4, 2, 1
-"""Of a whole certificate of one leg, of what a set of voters needs to stop a network and what it
-does to it, and of the gain up to which a smaller one cannot; from times of a processor that were
-measured.
+_QUICK_EFFORT, _WHOLE_EFFORT, _ELIGIBLE_EFFORT, _STOPPING_EFFORT, _WEAK_EFFORT = 3, 10, 2, 5, 3
+"""Of rows of the oscillators and of a whole certificate of one leg, of whether a leg may be
+chosen, of what a set of voters needs to stop a network and what it does to it, and of the gain up
+to which a smaller one cannot; from times of a processor that were measured.
 """
 
 
@@ -96,7 +96,7 @@ class Running:
         """
         if among in VOTE_ROWS:
             return Look.at(self.votes(until_lost=True))
-        until = among if among in OSCILLATOR_ROWS else BEFORE_VOTES if among else ''
+        until = among if among in QUICK_ROWS else BEFORE_VOTES if among else ''
         return Look.at(_certificate(self._of_certificate, False, True, until).inequalities)
 
     def votes(self, *, until_lost: bool = False) -> list[Inequality]:
@@ -105,9 +105,9 @@ class Running:
         return votes_among(of.parameters, of.networks, of.tick_s, until_lost=until_lost)
 
     def effort(self, among: str = '') -> int:
-        """How long :meth:`look` takes, mostly no longer; 1 is one of ``OSCILLATOR_ROWS`` for
-        one leg. ``auto`` takes as much for each leg that is not alike another, and votes some for
-        each set of voters in each network.
+        """How long :meth:`look` takes, mostly no longer; 1 is one of ``CLOSED_ROWS``
+        for one leg. ``auto`` takes as much for each leg that is not alike another, and votes some
+        for each set of voters in each network.
         """
         kinds, eligible, votes = 1, 0, 0
         if self.parameters.inhibition.auto:
@@ -120,7 +120,8 @@ class Running:
             votes = len(networks) * (_STOPPING_EFFORT * enough + _WEAK_EFFORT * fewer)
         if among in VOTE_ROWS:
             return votes
-        return votes + eligible + kinds * (1 if among in OSCILLATOR_ROWS else _WHOLE_EFFORT)
+        return votes + _ELIGIBLE_EFFORT * eligible + kinds * (
+            1 if among in CLOSED_ROWS else _QUICK_EFFORT if among in QUICK_ROWS else _WHOLE_EFFORT)
 
     @property
     def networks(self) -> list[GaitNetwork]:

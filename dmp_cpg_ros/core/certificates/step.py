@@ -303,13 +303,12 @@ def _locking(s: Setting, analysis: NetworkAnalysis, L: Array, h: float, farthest
 
 
 def step_inequalities(s: Setting, rate: float, found: SteppedNetwork | None) -> list[Inequality]:
-    """Inequalities (d): the step for itself, the tick against the mild part, and against the
-    region C.
+    """Inequalities (d) of the step: for itself, and the tick against the mild part.
 
     Parameters
     ----------
     s : Setting
-        Oscillators, region and tick.
+        Oscillators and tick.
     rate : float
         Slowest certified rate of the network [1/s].
     found : SteppedNetwork or None
@@ -321,8 +320,7 @@ def step_inequalities(s: Setting, rate: float, found: SteppedNetwork | None) -> 
         See :func:`~dmp_cpg_ros.core.certificates.inequality.discharged` for which are required.
     """
     rho, radius = s.network.parameters.rho, s.network.parameters.radius
-    omega, tick_s, r0 = s.span.omega[1], s.tick_s, s.parameters.inhibition.region_radius
-    limit = longest_step(rho, radius, omega, rate)
+    limit = longest_step(rho, radius, s.span.omega[1], rate)
     farthest, captured, locking = (math.inf, -math.inf, -math.inf) if found is None else (
         found.farthest, found.approach, found.locking)
     return [
@@ -333,8 +331,17 @@ def step_inequalities(s: Setting, rate: float, found: SteppedNetwork | None) -> 
                    'steps take captured states towards each other and to rest', required=False),
         Inequality('step_synchronisation', 0.0, locking, '1/s', 'zero', 'rate of the step', PROVED,
                    'steps take the legs to their places', required=False),
-        Inequality('time_step', tick_s, limit, 's', 'tick', 'longest stable step', SAMPLED,
-                   'what decays in the equations decays in their numerical integration'),
+        Inequality('time_step', s.tick_s, limit, 's', 'tick', 'longest stable step', SAMPLED,
+                   'what decays in the equations decays in their numerical integration')]
+
+
+def cycle_inequalities(s: Setting) -> list[Inequality]:
+    """Inequalities (d) of the limit cycle: its radius as integrated, and ticks against the region
+    C.
+    """
+    rho, radius = s.network.parameters.rho, s.network.parameters.radius
+    omega, tick_s, r0 = s.span.omega[1], s.tick_s, s.parameters.inhibition.region_radius
+    return [
         Inequality('cycle_radius', cycle_radius_error(rho, radius, omega, tick_s),
                    radius_tolerance(radius, r0) / radius, '',
                    '|R/r - 1| as integrated', 'what capture allows', PROVED,

@@ -16,7 +16,7 @@ from itertools import combinations
 from typing import Any
 
 from dmp_cpg_ros.core.canonical.inhibition import AUTO
-from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, OSCILLATOR_ROWS
+from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, QUICK_ROWS
 from dmp_cpg_ros.core.certificates.changes import refused_change
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, Look
@@ -33,9 +33,9 @@ _MOST_LOOKS, _MOST_WHOLE = 8, 5
 all.
 """
 
-MOST_EFFORT = 24
+MOST_EFFORT = 60
 """Most :meth:`Running.effort` of a verdict that looks for what would work, for its time to stay
-bounded: 1 to 1.6 ms each on a slow core."""
+bounded: 0.4 to 1 ms each on a slow core."""
 
 
 @dataclass(frozen=True)
@@ -129,9 +129,9 @@ class Change:
 
     def _nearest(self, lost: Sequence[Inequality]) -> str:
         """Nearest values that work, as text, where inequalities are lost; the one that is looked
-        at with most effort is looked at first.
+        at with least effort is looked at first.
         """
-        name = max((entry.name for entry in lost), key=self.proposed.effort)
+        name = min((entry.name for entry in lost), key=self.proposed.effort)
         looks = _Looks(MOST_EFFORT - self._judging(name))
         differences = self.present.differences(self.proposed)
         band = differences.pop('auto_hysteresis', None)  # goes with auto_speeds, certifies nothing
@@ -204,7 +204,7 @@ class _Looks:
             return _UNKNOWN
         seen = _look(running, among)
         lost = seen.lost[0] if seen.lost else ''
-        self.left -= running.effort(lost if lost in OSCILLATOR_ROWS else among)
+        self.left -= running.effort(lost if lost in QUICK_ROWS else among)
         return seen
 
 

@@ -6,13 +6,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from core_examples import GAITS, TICK, TICK_NS, network, quadruped, standing_state
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
-from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, OSCILLATOR_ROWS
+from dmp_cpg_ros.core.certificates import network as of_network
+from dmp_cpg_ros.core.certificates.certify import BEFORE_VOTES, QUICK_ROWS
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.certificates.inequality import Look
 from dmp_cpg_ros.core.certificates.verdict import MOST_EFFORT, Change
@@ -324,7 +326,7 @@ def test_what_looking_for_a_value_that_works_takes_is_bounded_and_what_is_told_w
 
     def counted(of: Running, among: str = '') -> Look:
         seen = look(of, among)
-        looked.append(of.effort(seen.lost[0] if {*seen.lost} & {*OSCILLATOR_ROWS} else among))
+        looked.append(of.effort(seen.lost[0] if {*seen.lost} & {*QUICK_ROWS} else among))
         return seen
 
     monkeypatch.setattr(Running, 'look', counted)
@@ -338,6 +340,38 @@ def test_what_looking_for_a_value_that_works_takes_is_bounded_and_what_is_told_w
         assert asked.changed({name: float(value) for name, value in told.items()}).holds()
     else:
         assert 'what works' in verdict.reason or 'looked for' in verdict.reason
+
+
+@pytest.mark.parametrize('values', [
+    {}, {'cadence_scale': 4.0}, {'rho': 60.0}, {'alpha_r': 0.05, 'coupling_gain': 1.0},
+    {'region_radius': 0.01}, {'inhibited_legs': ('auto',), 'coupling_graph': 'path'}], ids=str)
+def test_a_row_that_is_looked_at_by_itself_is_that_of_the_certificate(
+        values: dict[str, object]) -> None:
+    """Also where rows before it are lost, which then end the look."""
+    running = RUNNING.changed(values)
+    whole = Look.at(running.certificate().inequalities)
+    for name in QUICK_ROWS:
+        seen = running.look(name)
+        assert name in seen.shares or {*seen.lost} & {*whole.lost}
+        for row in seen.shares:
+            assert seen.shares[row] == pytest.approx(whole.shares[row], abs=1e-12)
+    assert bool(running.look().lost) == bool(whole.lost)
+
+
+def test_what_costs_least_is_looked_at_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cadence that the integration bears is found without the network's analysis."""
+    analysed = list[object]()
+    analyse = of_network.analyse_network
+
+    def counted(*of: Any) -> Any:
+        analysed.append(of)
+        return analyse(*of)
+
+    monkeypatch.setattr(of_network, 'analyse_network', counted)
+    running = replace(RUNNING, tick_s=0.02).changed({'inhibition_gain': 500.0})
+    verdict = judge({'cadence_scale': 2.0, 'coupling_gain': 30.0, 'rho': 3.0}, running)
+    assert not verdict.accepted and verdict.reason.startswith('cycle_radius')
+    assert 'nearest values that work' in verdict.reason and len(analysed) <= 3
 
 
 def test_a_refusal_of_other_gaits_by_speed_says_what_works() -> None:
