@@ -12,7 +12,9 @@ from collections import Counter
 from itertools import groupby
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
+import numpy as np
 import parsed_once  # noqa: F401
 import pytest
 from hypothesis import settings
@@ -30,6 +32,12 @@ os.environ.update(line.split('=', 1) for line in _shell.stdout.split('\0') if li
 
 LONG = ('project', 'suite', 'commands', 'studies', 'nodes')
 """Folders whose tests walk or start processes, those that take longest first."""
+
+
+@pytest.fixture
+def rng(request: pytest.FixtureRequest) -> np.random.Generator:
+    """Draws of a test of its own, whatever ran before it."""
+    return np.random.default_rng(crc32(request.node.name.encode()))
 
 
 def pytest_configure(config: pytest.Config) -> None:

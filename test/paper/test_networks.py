@@ -24,7 +24,6 @@ from dmp_cpg_ros.paper.oscillators import (
 )
 
 NAMES = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
-RNG = np.random.default_rng(0)
 SKEWED = np.array([[2.0, 1.0], [-0.5, 3.0]])  # not symmetric; does not commute with rotations
 
 
@@ -61,8 +60,8 @@ def test_jacobians_against_differences_and_within_their_bound(
     assert np.linalg.norm(whole, 2) <= of.stiffness(x) + 1e-9
 
 
-def test_hopf_oscillators_are_those_of_the_gait() -> None:
-    of, x = families(4)['hopf'], RNG.normal(size=(4, 2))
+def test_hopf_oscillators_are_those_of_the_gait(rng: np.random.Generator) -> None:
+    of, x = families(4)['hopf'], rng.normal(size=(4, 2))
     assert isinstance(of, HopfOscillators)
     for i in range(4):
         one = AndronovHopf(of.rho[i], of.radius[i])
@@ -85,8 +84,8 @@ def test_edges_do_what_the_coupling_matrix_does(
     assert of.symmetric == np.allclose(matrix, matrix.T)
 
 
-def test_nodes_that_nobody_acts_on_feel_nothing() -> None:
-    of, x = EdgeCoupling(graph_from_edges(4, ((1, 0), (3, 0)), 5.0)), RNG.normal(size=(4, 2))
+def test_nodes_that_nobody_acts_on_feel_nothing(rng: np.random.Generator) -> None:
+    of, x = EdgeCoupling(graph_from_edges(4, ((1, 0), (3, 0)), 5.0)), rng.normal(size=(4, 2))
     assert np.allclose(of(x), 5.0 * np.array([0 * x[0], x[0] - x[1], 0 * x[0], x[0] - x[3]]))
     assert not EdgeCoupling(graph_from_edges(3, (), 1.0))(x[:3]).any()
 
@@ -108,12 +107,12 @@ def run(of: OscillatorNetwork, x: np.ndarray, seconds: float, dt: float = 0.004,
     return x
 
 
-def test_the_network_moves_as_the_canonical_system_of_the_gait() -> None:
+def test_the_network_moves_as_the_canonical_system_of_the_gait(rng: np.random.Generator) -> None:
     phases = -2.0 * np.pi * np.array([0.0, 0.5, 0.75, 0.25])
     graph = graph_from_edges(4, topology('all_to_all', 4), 40.0, phases)
     gait = CanonicalSystem(graph, AndronovHopf(8.0), state_at(phases))
     of = OscillatorNetwork(HopfOscillators(4, 9.0), EdgeCoupling(graph), state_at(phases))
-    x = y = state_at(phases + 0.5) + 0.3 * RNG.normal(size=(4, 2))
+    x = y = state_at(phases + 0.5) + 0.3 * rng.normal(size=(4, 2))
     gains = np.array([150.0, 0.0, 0.0, 0.0])
     assert np.allclose(of.field(x, gains), gait.field(x, 9.0, gains))
     for _ in range(250):
@@ -125,10 +124,10 @@ def test_the_network_moves_as_the_canonical_system_of_the_gait() -> None:
 
 
 @pytest.mark.parametrize('name', NAMES)
-def test_equal_oscillators_lock_at_their_offsets(name: str) -> None:
+def test_equal_oscillators_lock_at_their_offsets(name: str, rng: np.random.Generator) -> None:
     phases = np.random.default_rng(2).uniform(-3.0, 3.0, 6)
     coupling = EdgeCoupling(graph_from_edges(6, topology(name, 6), 30.0, phases))
-    x = run(OscillatorNetwork(HopfOscillators(6, 5.0), coupling), RNG.normal(size=(6, 2)), 3.0)
+    x = run(OscillatorNetwork(HopfOscillators(6, 5.0), coupling), rng.normal(size=(6, 2)), 3.0)
     places = wrapped(phase(x) - phases)
     assert np.abs(wrapped(places - places[0])).max() < 1e-3
 

@@ -33,7 +33,6 @@ from dmp_cpg_ros.core.maths.vec3 import Triple, minus, plus, rotation, triple
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 
 NOISE = EstimationParameters()
-RANDOM = np.random.default_rng(7)
 
 
 def rotation_matrix(quaternion: Sequence[float]) -> np.ndarray:
@@ -45,11 +44,11 @@ def skew(v: np.ndarray) -> np.ndarray:
     return np.cross(v, np.eye(3)).T
 
 
-def some_state() -> FilterState:
-    quaternion = turned((0.0, 0.0, 0.0, 1.0), RANDOM.normal(0.0, 0.5, 3).tolist())
-    root = RANDOM.normal(0.0, 0.1, (12, 12))
+def some_state(rng: np.random.Generator) -> FilterState:
+    quaternion = turned((0.0, 0.0, 0.0, 1.0), rng.normal(0.0, 0.5, 3).tolist())
+    root = rng.normal(0.0, 0.1, (12, 12))
     velocity, gyro_bias, bias = (
-        triple(RANDOM.normal(0.0, size, 3).tolist()) for size in (1.0, 0.01, 0.1))
+        triple(rng.normal(0.0, size, 3).tolist()) for size in (1.0, 0.01, 0.1))
     return FilterState(quaternion, velocity, gyro_bias, bias, root @ root.T)
 
 
@@ -71,9 +70,9 @@ def error_between(state: FilterState, other: FilterState) -> np.ndarray:
 
 
 @pytest.mark.parametrize('_', range(5))
-def test_the_jacobian_of_the_prediction(_: int) -> None:
-    state, dt = some_state(), 1e-3
-    rate, force = (triple(RANDOM.normal(0.0, size, 3).tolist()) for size in (2.0, 10.0))
+def test_the_jacobian_of_the_prediction(_: int, rng: np.random.Generator) -> None:
+    state, dt = some_state(rng), 1e-3
+    rate, force = (triple(rng.normal(0.0, size, 3).tolist()) for size in (2.0, 10.0))
     after = predict(state, rate, force, dt, NOISE)
     by_differences = differences(
         lambda e: error_between(after, predict(moved(state, e), rate, force, dt, NOISE)),
@@ -103,10 +102,10 @@ def textbook_update(state: FilterState, rate: np.ndarray, contact: np.ndarray,
 
 
 @pytest.mark.parametrize('n', [1, 2, 4])
-def test_one_measurement_stands_for_all_feet(n: int) -> None:
-    state, rate = some_state(), RANDOM.normal(0.0, 2.0, 3)
-    contact, trust = RANDOM.normal(0.0, 0.3, (n, 3)), RANDOM.uniform(0.1, 1.0, n)
-    measured = state.velocity_in_base + RANDOM.normal(0.0, 0.3, (n, 3))
+def test_one_measurement_stands_for_all_feet(n: int, rng: np.random.Generator) -> None:
+    state, rate = some_state(rng), rng.normal(0.0, 2.0, 3)
+    contact, trust = rng.normal(0.0, 0.3, (n, 3)), rng.uniform(0.1, 1.0, n)
+    measured = state.velocity_in_base + rng.normal(0.0, 0.3, (n, 3))
     error, covariance = textbook_update(state, rate, contact, measured, trust)
     # and a foot that is not trusted measures nothing
     after, distance = update(state, rate, [*contact, np.ones(3)], [*measured, np.ones(3)],
@@ -118,9 +117,9 @@ def test_one_measurement_stands_for_all_feet(n: int) -> None:
     assert same is state
 
 
-def test_a_foot_measures_the_velocity_over_it() -> None:
-    state, rate = some_state(), RANDOM.normal(0.0, 2.0, 3)
-    contact = RANDOM.normal(0.0, 0.3, (4, 3))
+def test_a_foot_measures_the_velocity_over_it(rng: np.random.Generator) -> None:
+    state, rate = some_state(rng), rng.normal(0.0, 2.0, 3)
+    contact = rng.normal(0.0, 0.3, (4, 3))
 
     def predicted(error: np.ndarray) -> np.ndarray:
         other = moved(state, error)
@@ -137,9 +136,9 @@ def test_a_foot_measures_the_velocity_over_it() -> None:
     assert np.array_equal(after.gyro_bias, state.gyro_bias)
 
 
-def test_an_update_reduces_the_covariance_and_keeps_it_one() -> None:
-    state = some_state()
-    contact = RANDOM.normal(0.0, 0.3, (3, 3))
+def test_an_update_reduces_the_covariance_and_keeps_it_one(rng: np.random.Generator) -> None:
+    state = some_state(rng)
+    contact = rng.normal(0.0, 0.3, (3, 3))
     measured = np.tile(state.velocity_in_base, (3, 1))
     after, _ = update(state, state.gyro_bias, contact, measured, np.full(3, 0.7), NOISE)
     assert np.array_equal(after.covariance, after.covariance.T)
@@ -148,14 +147,14 @@ def test_an_update_reduces_the_covariance_and_keeps_it_one() -> None:
     np.testing.assert_allclose(after.velocity_in_base, state.velocity_in_base, atol=1e-12)
 
 
-def test_standing_still_makes_the_reading_the_bias() -> None:
-    state = dataclasses.replace(some_state(), covariance=np.diag(np.full(12, 0.01)))
+def test_standing_still_makes_the_reading_the_bias(rng: np.random.Generator) -> None:
+    state = dataclasses.replace(some_state(rng), covariance=np.diag(np.full(12, 0.01)))
     rate = plus(state.gyro_bias, (0.003, -0.002, 0.001))
     after = settle(state, rate, 0.1)  # as uncertain as the bias was: half the way
     np.testing.assert_allclose(after.gyro_bias, 0.5 * np.add(state.gyro_bias, rate))
     assert np.array_equal(after.velocity_in_base, state.velocity_in_base)
     assert after.covariance.diagonal()[6:9] == pytest.approx(np.full(3, 0.005))
-    state = some_state()
+    state = some_state(rng)
     after = settle(state, rate, 0.1)
     assert np.array_equal(after.quaternion, state.quaternion)
     assert np.linalg.eigvalsh(after.covariance).min() > -1e-12
@@ -168,8 +167,8 @@ def test_standing_still_makes_the_reading_the_bias() -> None:
                                atol=1e-12)
 
 
-def test_a_foot_that_disagrees_weighs_less() -> None:
-    state = dataclasses.replace(some_state(), covariance=np.diag(np.full(12, 0.01)))
+def test_a_foot_that_disagrees_weighs_less(rng: np.random.Generator) -> None:
+    state = dataclasses.replace(some_state(rng), covariance=np.diag(np.full(12, 0.01)))
     contact, zero = np.zeros((2, 3)), np.zeros(3)
     gains = []
     for size in (0.01, 1.0, 100.0):
@@ -193,13 +192,13 @@ def test_a_body_that_accelerates_unseen_does_not_tilt() -> None:
     assert tilts[0] > 0.01 and not tilts[1]
 
 
-def test_feet_tell_the_turn_rate() -> None:
-    v, rate = RANDOM.normal(0.0, 1.0, 3), RANDOM.normal(0.0, 1.0, 3)
+def test_feet_tell_the_turn_rate(rng: np.random.Generator) -> None:
+    v, rate = rng.normal(0.0, 1.0, 3), rng.normal(0.0, 1.0, 3)
     contact = np.array([[x, y, -0.3] for x in (0.2, -0.2) for y in (0.1, -0.1)])
     measured = v + np.cross(rate, contact)
-    trust, nothing, other = np.array([1.0, 0.3, 0.8, 1.0]), np.zeros(3), RANDOM.normal(size=3)
+    trust, nothing, other = np.array([1.0, 0.3, 0.8, 1.0]), np.zeros(3), rng.normal(size=3)
     alone = turn_rate_of_feet(contact, measured, trust, nothing)
-    np.testing.assert_allclose(alone, rate, rtol=0.2)
+    assert np.linalg.norm(alone - rate) < 0.2 * np.linalg.norm(rate)
     np.testing.assert_allclose(turn_rate_of_feet(contact, measured, trust, rate), rate)
     two = turn_rate_of_feet(contact[:2], measured[:2], np.ones(2), other)  # on a line along y
     assert two[1] == pytest.approx(other[1])
@@ -218,9 +217,9 @@ def test_a_foot_that_has_just_come_down_turns_no_body() -> None:
     assert turns[0] < 0.1 * turns[2] < 0.5 * turns[1] < turns[2]
 
 
-def test_rotations_agree_with_each_other() -> None:
+def test_rotations_agree_with_each_other(rng: np.random.Generator) -> None:
     for _ in range(10):
-        v, u = RANDOM.normal(0.0, 1.0, 3), RANDOM.normal(0.0, 1.0, 3)
+        v, u = rng.normal(0.0, 1.0, 3), rng.normal(0.0, 1.0, 3)
         q = turned((0.0, 0.0, 0.0, 1.0), v)
         R = rotation_matrix(q)
         np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
@@ -235,9 +234,9 @@ def test_rotations_agree_with_each_other() -> None:
             turned(q, np.full(3, small)), q, atol=2.0 * small + 1e-15)
 
 
-def test_a_body_at_rest_is_levelled_by_its_accelerometer() -> None:
+def test_a_body_at_rest_is_levelled_by_its_accelerometer(rng: np.random.Generator) -> None:
     for _ in range(10):
-        R = rotation_matrix(turned((0.0, 0.0, 0.0, 1.0), RANDOM.normal(0.0, 0.6, 3)))
+        R = rotation_matrix(turned((0.0, 0.0, 0.0, 1.0), rng.normal(0.0, 0.6, 3)))
         q = levelled(GRAVITY * R[2])
         np.testing.assert_allclose(rotation_matrix(q)[2], R[2], atol=1e-12)
         assert roll_pitch_yaw(np.array(q))[2] == pytest.approx(0.0, abs=1e-12)

@@ -10,12 +10,10 @@ import pytest
 from dmp_cpg_ros.core.maths import vec3
 from dmp_cpg_ros.core.maths.rotations import turned
 
-RANDOM = np.random.default_rng(11)
-
 
 @pytest.mark.parametrize('_', range(5))
-def test_products_and_inverse(_: int) -> None:
-    a, b, M = RANDOM.normal(size=3), RANDOM.normal(size=3), RANDOM.normal(size=(3, 3))
+def test_products_and_inverse(_: int, rng: np.random.Generator) -> None:
+    a, b, M = rng.normal(size=3), rng.normal(size=3), rng.normal(size=(3, 3))
     u, v = vec3.triple(a.tolist()), vec3.triple(b.tolist())
     rows = tuple(vec3.triple(row) for row in M.tolist())
     matrix = (rows[0], rows[1], rows[2])
@@ -30,8 +28,8 @@ def test_products_and_inverse(_: int) -> None:
     np.testing.assert_allclose(np.array(vec3.inverse(matrix)) @ M, np.eye(3), atol=1e-10)
 
 
-def test_rotations() -> None:
-    vector = RANDOM.normal(size=3)
+def test_rotations(rng: np.random.Generator) -> None:
+    vector = rng.normal(size=3)
     quaternion = turned((0.0, 0.0, 0.0, 1.0), vector.tolist())
     R, angle = np.array(vec3.rotation(quaternion)), float(np.linalg.norm(vector))
     (x, y, z), across = vector / angle, np.cross(vector, [1.0, 2.0, 3.0])
