@@ -193,8 +193,8 @@ class BodyEstimator:
 
     def resumed(self, memory: EstimatorState, readings: SensorReadings
                 ) -> tuple[EstimatorState, BodyEstimate]:
-        """Go on after a while without readings, in which a body that walks has kept its attitude
-        and velocity; arguments and results as of :meth:`step`.
+        """Go on after a while without readings, in which a body has kept its attitude; its
+        velocity is that of its feet, where any stands. Arguments and results as of :meth:`step`.
         """
         return self._begin(readings, memory)
 
@@ -216,7 +216,7 @@ class BodyEstimator:
         trust, legs = self._trust(readings, motion, normal), readings.usable_legs
         rate = triple(readings.rate_in_base.tolist()) if seeing else zero
         stands = [t > 0.0 for t in trust] if moving and any(trust) else legs
-        if moving and any(trust):
+        if (moving or before is not None) and any(trust):  # it may have come to a stand meanwhile
             state = replace_unchecked(
                 state, velocity_in_base=mid_stride.velocity_of_feet(motion, rate, trust))
         contact = [vec3.times(R, place) for place in motion.contact_in_base]

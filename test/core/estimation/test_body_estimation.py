@@ -289,3 +289,21 @@ def test_after_a_while_without_readings_it_goes_on_with_the_attitude_that_it_had
     k = len(exact) - 1
     off = np.abs(errors([*[estimate] * k, estimate])[k])
     assert off[:5].max() < 0.01 and off[5] < 0.1  # nothing tells how far it has turned meanwhile
+
+
+@pytest.mark.parametrize('speed', [0.5, 1.0, 2.0])
+def test_who_walked_and_stands_after_a_while_without_readings_believes_its_imu(
+        speed: float) -> None:
+    """The speed of before, of which the feet take all back at once, is no fault of the IMU."""
+    still = list(readings(ROBOT, dataclasses.replace(SWAY, begin=9.0), 2.0))
+    estimator, memory = BodyEstimator(ROBOT, EstimationParameters()), None
+    for reading in still[:100]:
+        memory, _ = estimator.step(memory, reading)
+    memory = dataclasses.replace(memory, filter=dataclasses.replace(
+        memory.filter, velocity_in_base=(speed, 0.0, 0.0)))
+    memory, _ = estimator.resumed(memory, still[200])
+    for reading in still[201:]:
+        memory, estimate = estimator.step(memory, reading)
+        assert not memory.imu.doubted_s and not estimate.problems
+        assert np.abs(roll_pitch_yaw(estimate.quaternion)).max() < 1e-3
+        assert np.linalg.norm(estimate.velocity_in_base) < 1e-2
