@@ -49,7 +49,7 @@ def kills(results: Any) -> str:
     for lock_step, how in ((True, 'in lock-step'), (False, 'in real time')):
         of = [one for one in results if one['lock_step'] == lock_step]
         fell, count = sum(one['fell'] for one in of), sum(len(one['kills']) for one in of)
-        told.append(f'{count} nodes killed {how}: {fell or "no"} fall')
+        told.append(f'{count} nodes killed {how}: {fell or "no"} fall{"s" * (fell > 1)}')
     return ', '.join(told)
 
 
