@@ -36,6 +36,7 @@ from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, PROVED
 from dmp_cpg_ros.core.contraction.hopf_bounds import transverse_rate
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, NONE, REGIONAL
+from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
 from dmp_cpg_ros.core.inhibition.entry import SMALLEST_RADIUS, eligible_legs
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, REST_ACTIVITY
 from dmp_cpg_ros.core.maths import Array
@@ -108,12 +109,13 @@ def certify(s: Setting, legs: Collection[int] = (), *, required_only: bool = Fal
 def _certificate(s: Setting, required_only: bool, until_lost: bool, until: str,
                  votes: Callable[[], list[Inequality]]) -> Certificate:
     p, network = s.network.parameters, s.network
-    quick = [*cycle_inequalities(s), *hierarchy_inequalities(s)]
+    found = of_network.free_synchronisation(network)
+    quick = [*cycle_inequalities(s), *hierarchy_inequalities(s, found)]
     if until in {row.name for row in quick} or (until_lost and lost(quick)):
         return Certificate(tuple(quick), NONE, s.span.omega[1])
     rows: list[Inequality] = []
-    analysis = of_network.analyse_network(network, s.parameters.inhibition, s.span)
-    found, contraction = analysis.found, analysis.contraction
+    analysis = of_network.analyse_network(network, s.parameters.inhibition, s.span, found)
+    contraction = analysis.contraction
     for row in of_network.network_inequalities(s, analysis):
         rows.append(row)
         if row.name == until or (until_lost and not row.holds):
@@ -235,7 +237,7 @@ def spring_damper_contraction(stiffness: float, damping: float) -> tuple[float, 
     return rate, np.array([[s, 0.0], [half, 1.0]])
 
 
-def hierarchy_inequalities(s: Setting) -> list[Inequality]:
+def hierarchy_inequalities(s: Setting, found: Synchronisation) -> list[Inequality]:
     """Inequalities (e): rates of the driving and the driven systems, and Theorem 4 for the whole,
     with the synchronisation of the oscillators.
     """
@@ -248,8 +250,7 @@ def hierarchy_inequalities(s: Setting) -> list[Inequality]:
     alpha_r = s.parameters.reference.alpha_r
     whole = hierarchy.coupled_primitives(
         hierarchy.Part('reference', hierarchy.CONTRACTING, alpha_r),
-        hierarchy.Part('oscillator', hierarchy.TRANSVERSE, oscillator),
-        of_network.free_synchronisation(s.network),
+        hierarchy.Part('oscillator', hierarchy.TRANSVERSE, oscillator), found,
         [hierarchy.Part('swing filters', hierarchy.CONTRACTING, filters),
          hierarchy.Part('joints', hierarchy.CONTRACTING, spring)])
     return [

@@ -106,8 +106,8 @@ class Running:
 
     def effort(self, among: str = '') -> int:
         """How long :meth:`look` takes, mostly no longer; 1 is one of ``CLOSED_ROWS``
-        for one leg. ``auto`` takes as much for each leg that is not alike another, and votes some
-        for each set of voters in each network.
+        for one leg. ``auto`` takes twice as much for each leg that is not alike another, and votes
+        some for each set of voters in each network.
         """
         kinds, eligible, votes = 1, 0, 0
         if self.parameters.inhibition.auto:

@@ -150,14 +150,17 @@ def free_synchronisation(network: GaitNetwork) -> Synchronisation:
 
 
 def analyse_network(network: GaitNetwork, inhibition: InhibitionParameters,
-                    span: OperatingRange) -> NetworkAnalysis:
-    """Apply the theorems to the network of a gait at the cadences of a range."""
+                    span: OperatingRange, found: Synchronisation | None = None
+                    ) -> NetworkAnalysis:
+    """Apply the theorems to the network of a gait at the cadences of a range; Theorem 4 may have
+    been applied already.
+    """
     system = network.system
     # A gain of zero holds nothing; the smallest positive one says so in numbers.
     acting = replace(
         inhibition, inhibition_gain=max(inhibition.inhibition_gain, 1e-9)).armed_gains
     capture = capture_set(system, span.omega[1], acting, inhibition.region_radius)
-    return NetworkAnalysis(free_synchronisation(network), capture,
+    return NetworkAnalysis(found or free_synchronisation(network), capture,
                            inhibited.inhibited_contraction(system, capture), system, span)
 
 
