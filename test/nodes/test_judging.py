@@ -16,9 +16,15 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from ros_processes import DEADLINE_S
+import ros_processes
+from rclpy.executors import SingleThreadedExecutor
+from ros_processes import DEADLINE_S, Ros
 
+from dmp_cpg_ros.nodes.framework import judging
 from dmp_cpg_ros.nodes.framework.judging import NAME, Compute, Judge, JudgeError
+from dmp_cpg_ros.nodes.posture_control import PostureControl
+
+ros, ros_domain = ros_processes.ros, ros_processes.ros_domain
 
 
 @pytest.fixture
@@ -47,6 +53,28 @@ def test_it_answers_by_its_own_name_whatever_is_raised_and_leaves_ctrl_c_to_othe
     assert Path(f'/proc/{pid}/comm').read_text(encoding='utf-8') == f'{NAME}\n'
     words = Path(f'/proc/{pid}/cmdline').read_text(encoding='utf-8').split('\0')
     assert words[0] == NAME and not any(words[1:])
+
+
+def test_who_cannot_use_an_answer_keeps_no_other_from_its_own(
+        judge: Judge, capfd: pytest.CaptureFixture[str]) -> None:
+    judge.ask(os.getpid, partial(int.__add__, 'no number'))
+    assert answer(judge, os.getpid) == judge.pid
+    assert 'TypeError' in capfd.readouterr().err
+
+
+def test_an_answer_to_a_node_whose_executor_was_shut_down_is_dropped(
+        ros: Ros, judge: Judge, monkeypatch: pytest.MonkeyPatch,
+        capfd: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(judging, 'judge', lambda: judge)
+    node = PostureControl(context=ros.context)
+    executor = SingleThreadedExecutor(context=ros.context)
+    executor.add_node(node)
+    executor.shutdown()
+    used: list[object] = []
+    judging.beside_ticks(node, os.getpid, used.append)
+    assert answer(judge, os.getpid) == judge.pid
+    assert not used and not capfd.readouterr().err
+    node.destroy_node()
 
 
 def test_it_is_there_before_it_is_asked_once_and_another_one_after_its_death(

@@ -19,10 +19,13 @@ import signal
 import subprocess
 import sys
 import threading
+import traceback
 from collections import deque
 from collections.abc import Callable, Generator
 from functools import lru_cache, partial
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
+
+from rclpy.exceptions import InvalidHandle
 
 from dmp_cpg_ros.process import collect_seldom, show_command, show_name
 
@@ -123,7 +126,7 @@ class Judge:
             What; it and its result go through :mod:`pickle`.
         use : callable (object)
             Called in a thread with the result, or with what was raised; a :class:`JudgeError`
-            where the process did not answer.
+            where the process did not answer. What it raises itself is printed.
         """
         self._asked.put((compute, use))
         if self._thread is None:
@@ -133,7 +136,10 @@ class Judge:
     def _work(self) -> None:
         while True:
             compute, use = self._asked.get()
-            use(self._computed(compute))
+            try:
+                use(self._computed(compute))
+            except Exception:  # noqa: BLE001 - those that asked later wait for this thread
+                traceback.print_exc()
 
     def _computed(self, compute: Compute) -> Any:
         try:
@@ -179,9 +185,12 @@ def beside_ticks(node: SuiteNode, compute: Compute, use: Use) -> None:
 def _computed(node: SuiteNode, compute: Compute, use: Use, result: Any) -> None:
     """Pass on, from another thread, what was computed."""
     executor = node.executor
-    if executor is not None:  # else the node has ended
-        executor.create_task(node.guarded('beside ticks', lambda: use(
-            compute() if isinstance(result, Exception) else result)))
+    if executor is None:  # the node has ended
+        return
+    task = node.guarded('beside ticks', lambda: use(
+        compute() if isinstance(result, Exception) else result))
+    with contextlib.suppress(AttributeError, InvalidHandle):  # of an executor that was shut down
+        executor.create_task(task)
 
 
 class Slices:
