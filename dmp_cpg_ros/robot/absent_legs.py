@@ -25,9 +25,15 @@ IN_TIME_NS = 60_000_000
 that come now and then only tell what was, and to follow them each time tears at the feet.
 """
 
+SETTLED_NS = 500_000_000
+"""Time since all legs have been followed again from which they may all go on with the cycle of
+before that disturbance [ns]. Sooner they do not balance with it: of trots at 50 Hz whose legs were
+silent again 0.2 to 0.6 s later four of twelve fell.
+"""
+
 SEVERAL_NS = 100_000_000
-"""Time for which several legs may go on with the cycle of before a disturbance [ns]: they do not
-balance with it.
+"""Time for which several legs that are not settled may go on with it [ns], where it was one at
+first.
 """
 
 IN_STEP_NS = 200_000_000
@@ -76,13 +82,15 @@ class AbsentLegs:
         self.all_here()
 
     def all_here(self) -> None:
-        """Forget who has been away."""
-        self.since_ns, self._several = 0, (0, -IN_TIME_NS)
+        """Forget who has been away, of a robot that has looked after itself: what it did before
+        is no cycle of what it does then.
+        """
+        self.since_ns, self._followed_ns, self._several = 0, 0, (0, -IN_TIME_NS)
         self._late_ns, self._away_ns = [0] * len(LEGS), [0] * len(LEGS)
 
-    def look(self, *, alone: bool = False) -> None:
-        """Look for the rhythm, while nobody is away; for a leg alone, also for that of before."""
-        self.rhythm = self._memory.rhythm(alone=alone)
+    def look(self, *, of_before: bool = False) -> None:
+        """Look for the rhythm, while nobody is away; where there is none that of before may do."""
+        self.rhythm = self._memory.rhythm(of_before=of_before)
 
     def watch(self, now: int, ages: list[int]) -> None:
         """Note who is late, by the ages of the legs' targets [ns]; two, whose controllers starve,
@@ -91,9 +99,9 @@ class AbsentLegs:
         late = [age > CARRIED_NS for age in ages]
         alone = sum(late) == 1
         if not self.since_ns:
-            self.look(alone=alone)
+            self.look(of_before=alone or self._settled(now))
         of_before = self.rhythm is not None and self.rhythm.of_before
-        if of_before and not alone:
+        if of_before and not alone and not self._settled(self.since_ns or now):
             since, last = self._several
             self._several = since if now - last < IN_TIME_NS else now, now
         for i, so in enumerate(late):
@@ -101,6 +109,10 @@ class AbsentLegs:
                 self._late_ns[i] = now
                 self._away_ns[i] = self._away_ns[i] or now
                 self.since_ns = self.since_ns or now
+
+    def _settled(self, now: int) -> bool:
+        """Whether all legs had been followed again for long enough when the first was late."""
+        return 0 < self._followed_ns < now - SETTLED_NS
 
     def go_on(self, now: int, targets: Array, given: Array) -> bool:
         """Let those who are away go on.
@@ -145,6 +157,9 @@ class AbsentLegs:
                 if self.rhythm is not None:
                     self._memory.went_on(i, now, going[:, of])
         self.since_ns = min(filter(None, self._away_ns), default=0)
+        if not self.since_ns and self.rhythm is not None and (
+                self._followed_ns or not self.rhythm.of_before):
+            self._followed_ns = now
         return True
 
     def take_up(self, now: int, off: Array, seconds: float) -> None:

@@ -5,9 +5,8 @@
 A steady gait is a limit cycle, so its last period is all that is left to know of it: the targets
 a time t after the last ones are those of a period T before, q_d(t) = q_d(t − T). T is the lag at
 which the memory resembles its own end most. A robot that was disturbed a moment ago returns to the
-cycle that it had; where it has no other rhythm a leg alone takes that one up, at the phase that is
-nearest. All legs with it would not balance: of six trots whose legs were all silent for half a
-second, again and again, two fell.
+cycle that it had; where it has no other rhythm a leg alone takes that one up at once, at the phase
+that is nearest, and all legs where they have been followed again for a while.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ whose legs died, those that were the gait's had 0.22 and 0.53 at most; what rese
 robot that speeds up by chance had 0.22 and 0.41, and 2.1 over its cycle.
 """
 
-KNOWN_NS, NEAREST = 8_000_000_000, 0.2
+KNOWN_NS, NEAREST = 8_000_000_000, 0.6
 """Time for which a cycle that was found is known [ns], and how little it may differ at its nearest
 phase from the end of the memory, as a share of its variance.
 """
@@ -90,9 +89,9 @@ class LastCycle:
         return next((entry for entry in reversed(heard) if entry[0] <= time_ns),
                     heard[0] if heard else None)
 
-    def rhythm(self, *, alone: bool = False) -> Rhythm | None:
+    def rhythm(self, *, of_before: bool = False) -> Rhythm | None:
         """Rhythm of the last targets up to the last that all legs sent; None where they have
-        none. For a leg alone, that of before will do, at the phase that is nearest to them.
+        none, and that of before will not do, at the phase that is nearest to them.
         """
         if not all(self._done):
             return None
@@ -109,7 +108,7 @@ class LastCycle:
         if lag:
             self._known = Rhythm(end_ns, memory[-lag - 1:])
             return self._known
-        if known is None or not alone or end_ns - known.end_ns > KNOWN_NS:
+        if known is None or not of_before or end_ns - known.end_ns > KNOWN_NS:
             return None
         return known.from_phase_of(memory[-COMPARED:], end_ns)
 

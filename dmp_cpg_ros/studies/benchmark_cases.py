@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 from math import pi
 from typing import Any
 
@@ -150,6 +151,9 @@ STARVED_WALKS = (('amble', 0.5), ('trot', 1.0))
 
 BACK_WITHIN = (0.3, 0.6, 1.1)
 """Times within which legs that die in those gaits are back [s]."""
+
+TWICE_SILENT = tuple(product((50.0, 100.0), (0.3, 0.7, 1.1, 1.5, 2.0)))
+"""Rates [Hz] at which legs are silent twice, and the time between [s]."""
 
 WEAK = 0.4
 """Share of its torque that a weak drive has."""

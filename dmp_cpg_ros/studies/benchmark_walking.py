@@ -11,11 +11,12 @@ with longer legs. obstacles: steps that are too high. contacts: rough ground wit
 feedback of touchdown and the stumbling reflex. climbing: stairs without and with what all legs
 share of one foot's step. delays: targets that arrive late; slow_rates: also where a tick is long.
 starved: those of controllers that do not get to run; killed_legs: of legs that die and are started
-again. mismatch: a robot that is not as its controllers know it. gaits: every ordered pair of gaits
-changed while moving; fast_gaits: at the highest speeds, forwards and backwards, of other robots
-too; returns: while they are told to go back, and stopped. restarts: posture control that forgets
-all in the middle of a stride, as a node that is started again. robots: other robots, with their
-files alone; those of the extra `robots` are left out where it is not installed.
+again; twice_silent: of all legs, soon after such a death. mismatch: a robot that is not as its
+controllers know it. gaits: every ordered pair of gaits changed while moving; fast_gaits: at the
+highest speeds, forwards and backwards, of other robots too; returns: while they are told to go
+back, and stopped. restarts: posture control that forgets all in the middle of a stride, as a node
+that is started again. robots: other robots, with their files alone; those of the extra `robots`
+are left out where it is not installed.
 
 The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
 """
@@ -163,6 +164,19 @@ def killed_legs(workers: Workers, seeds: int, phases: int) -> Table:
     return Table('Legs that die and are started again', (
         'gait, m/s', 'back within s', 'deaths', 'looked after itself', 'fell',
         'largest tilt rad, median / worst'), rows, results)
+
+
+def twice_silent(workers: Workers, seeds: int, phases: int) -> Table:
+    """Falls, and stands at the second time, by how soon legs are silent once more."""
+    cells = [(*walk, *silent) for walk, silent in product(given.STARVED_WALKS, given.TWICE_SILENT)]
+    results = run(workers, late_walks.twice_silent, [
+        {'gait': gait, 'speed': speed, 'rate': rate, 'after_s': after_s, 'seed': seed + 1}
+        for gait, speed, rate, after_s in cells for seed in range(seeds)])
+    rows = [(f'{gait} {speed:g}', f'{rate:g}', f'{after_s:g}',
+             f'{sum(one.stood for one in of)}/{seeds}', f'{sum(one.fell for one in of)}/{seeds}')
+            for (gait, speed, rate, after_s), of in by_cell(cells, results)]
+    return Table('Legs that are silent twice', (
+        'gait, m/s', 'control_rate Hz', 's between', 'stood', 'fell'), rows, results)
 
 
 def mismatch(workers: Workers, seeds: int, phases: int) -> Table:
@@ -328,8 +342,8 @@ def robots(workers: Workers, seeds: int, phases: int) -> Table:
 TABLES = {make.__name__: make for make in (
     speeds, benchmark_pushes.pushes, benchmark_pushes.timing, benchmark_pushes.manoeuvres,
     benchmark_pushes.unpushed, grounds.rough, grounds.rougher, grounds.higher, grounds.obstacles,
-    grounds.contacts, grounds.climbing, delays, slow_rates, starved, killed_legs, mismatch, gaits,
-    fast_gaits, returns, restarts, robots)}
+    grounds.contacts, grounds.climbing, delays, slow_rates, starved, killed_legs, twice_silent,
+    mismatch, gaits, fast_gaits, returns, restarts, robots)}
 """What can be measured."""
 
 

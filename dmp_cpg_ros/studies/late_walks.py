@@ -30,6 +30,14 @@ STARVED_S = 15.0
 SOUND_NS = 4_000_000_000
 """Time of a walk from which on they do [ns]."""
 
+SILENT_S, TWICE_S = (0.35, 0.9), 6.0
+"""Range of times for which legs are silent that are so twice, and time for which the robot is
+watched besides that between the two [s].
+"""
+
+WAITED_MS = 15.0
+"""Ticks longer than that wait for the legs' targets, as those of ``mujoco_robot`` do [ms]."""
+
 TARGET_TIMEOUT_NS = round(1e9 * RobotParameters().target_timeout)
 
 
@@ -148,6 +156,8 @@ class StarvedWalk(LateWalk):
         How.
     seed : int
         Of the stalls and of the start.
+    rate : float
+        ``control_rate`` [Hz].
 
     Attributes
     ----------
@@ -155,11 +165,12 @@ class StarvedWalk(LateWalk):
         How often the robot has looked after itself.
     """
 
-    def __init__(self, gait: str, stalls: Stalls, seed: int) -> None:
+    def __init__(self, gait: str, stalls: Stalls, seed: int,
+                 rate: float = TickParameters.control_rate) -> None:
         self._stalls, self._draw = stalls, np.random.default_rng((seed, 1))
         self._until_ns, self._next_ns = [0] * len(LEGS), [SOUND_NS] * len(LEGS)
         self.stood, self._alone = 0, False
-        super().__init__(gait, (0.0, USUAL_MS), 0, seed)
+        super().__init__(gait, (0.0, USUAL_MS), 0, seed, rate)
 
     def acting(self, tick: Tick) -> JointTargets:
         """As :class:`LateWalk`; the gait hears of the robot's fallback."""
@@ -219,6 +230,8 @@ class KilledWalk(StarvedWalk):
         Of all draws and of the start.
     longest_s : float
         Within which time a leg is back [s].
+    rate : float
+        ``control_rate`` [Hz].
 
     Attributes
     ----------
@@ -228,30 +241,42 @@ class KilledWalk(StarvedWalk):
 
     return_ns = round(1e9 * RETURN_S)
 
-    def __init__(self, gait: str, seed: int, longest_s: float) -> None:
+    def __init__(self, gait: str, seed: int, longest_s: float,
+                 rate: float = TickParameters.control_rate) -> None:
         self._fate, self._longest_s, self.kills = np.random.default_rng((seed, 2)), longest_s, 0
-        self._dead, self._until_it_lives_ns, self._dies_ns = -1, 0, round(
+        self._dead: tuple[int, ...] = ()
+        self._until_they_live_ns, self._dies_ns = 0, round(
             1e9 * (STANDING + self._fate.uniform(0.1, 1.5)))
-        super().__init__(gait, Stalls(0.0, 0.0), seed)
+        super().__init__(gait, Stalls(0.0, 0.0), seed, rate)
         self._next_ns = [round(1e9 * (STANDING + STARVED_S)) + 1] * len(LEGS)  # no stalls
 
     def acting(self, tick: Tick) -> JointTargets:
         """As :class:`StarvedWalk`; some legs live, some do not."""
-        now_ns, draw = tick.time_ns, self._fate.uniform
-        if self._dead < 0 and now_ns >= self._dies_ns:
-            self._dead, self.kills = int(self._fate.integers(len(LEGS))), self.kills + 1
-            self._until_it_lives_ns = now_ns + round(1e9 * self._longest_s * draw(0.03, 1.0))
-        elif self._dead >= 0 and now_ns >= self._until_it_lives_ns:
-            self.loop.leg_states[self._dead] = self.loop.legs[self._dead].picked_up(
-                tick.gait, tick.x, tick.x_dot, tick.r, tick.feedback)
-            targets = super().acting(tick)  # this tick's were those of the leg that has died
-            self._dead, self._dies_ns = -1, now_ns + round(1e9 * draw(0.3, 3.0))
+        now_ns = tick.time_ns
+        if not self._dead and now_ns >= self._dies_ns:
+            self._dead, for_s = self.who_dies()
+            self.kills, self._until_they_live_ns = self.kills + 1, now_ns + round(1e9 * for_s)
+        elif self._dead and now_ns >= self._until_they_live_ns:
+            for leg in self._dead:
+                self.loop.leg_states[leg] = self.loop.legs[leg].picked_up(
+                    tick.gait, tick.x, tick.x_dot, tick.r, tick.feedback)
+            targets = super().acting(tick)  # this tick's were those of the legs that have died
+            self._dead, self._dies_ns = (), now_ns + round(1e9 * self.lives_on_s())
             return targets
         return super().acting(tick)
 
+    def who_dies(self) -> tuple[tuple[int, ...], float]:
+        """Legs that die now, and after what time they are back [s]."""
+        leg = int(self._fate.integers(len(LEGS)))
+        return (leg,), self._longest_s * self._fate.uniform(0.03, 1.0)
+
+    def lives_on_s(self) -> float:
+        """After what time the next one dies [s]."""
+        return float(self._fate.uniform(0.3, 3.0))
+
     def arrives_ns(self, i: int, now_ns: int, first: bool) -> int | None:
         """When what a leg sends now arrives [ns]; None: never."""
-        return None if i == self._dead else super().arrives_ns(i, now_ns, first)
+        return None if i in self._dead else super().arrives_ns(i, now_ns, first)
 
 
 @dataclass(frozen=True)
@@ -266,6 +291,58 @@ def killed(gait: str, speed: float, seed: int, longest_s: float) -> KilledOutcom
     """Start to walk at a speed [m/s], and go on for ``STARVED_S``; see :class:`KilledWalk`."""
     run = KilledWalk(gait, seed, longest_s)
     run.loop.command(speed)
-    upright = run.walk(STARVED_S)
+    return _outcome(run, run.walk(STARVED_S))
+
+
+def _outcome(run: KilledWalk, upright: bool) -> KilledOutcome:
     tilt = float(np.abs(attitude(run.states)[:, :2]).max())
     return KilledOutcome(not upright, run.stood, run.kills, tilt)
+
+
+class TwiceSilentWalk(KilledWalk):
+    """A walk at a steady speed in which one leg or all of them die, as of ``posture_control``,
+    and all of them a second time soon after they are back.
+
+    Parameters
+    ----------
+    gait : str
+        Name of the gait.
+    seed : int
+        Of all draws and of the start.
+    after_s : float
+        Time from the return to the second death [s].
+    rate : float
+        ``control_rate`` [Hz].
+    """
+
+    def __init__(self, gait: str, seed: int, after_s: float, rate: float) -> None:
+        self._after_s = after_s
+        super().__init__(gait, seed, SILENT_S[1], rate)
+        self._dies_ns = 10**18
+        if 1e3 / rate > WAITED_MS:
+            self._delay_ms = 0.0, 0.0
+
+    def walks(self) -> None:
+        """Let the first die within a second."""
+        self._dies_ns = self.state.time_ns + round(1e9 * self._fate.uniform(0.0, 1.0))
+
+    def who_dies(self) -> tuple[tuple[int, ...], float]:
+        """Legs that die now, and after what time they are back [s]."""
+        legs, draw = tuple(range(len(LEGS))), self._fate.uniform
+        if not self.kills and draw() < 0.5:
+            legs = (int(self._fate.integers(len(LEGS))),)
+        return legs, draw(*SILENT_S)
+
+    def lives_on_s(self) -> float:
+        """After what time the next one dies [s]."""
+        return self._after_s if self.kills < 2 else 2.0 * STARVED_S
+
+
+def twice_silent(gait: str, speed: float, after_s: float, rate: float, seed: int) -> KilledOutcome:
+    """Ramp to a speed [m/s] and walk on while legs are silent twice; see
+    :class:`TwiceSilentWalk`.
+    """
+    run = TwiceSilentWalk(gait, seed, after_s, rate)
+    upright = run.settle((speed, 0.0, 0.0))
+    run.walks()
+    return _outcome(run, upright and run.walk(TWICE_S + after_s))

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import tau
 
 import numpy as np
@@ -15,6 +16,7 @@ from dmp_cpg_ros.robot.absent_legs import (
     CARRIED_NS,
     IN_TIME_NS,
     JOINTS,
+    SETTLED_NS,
     SEVERAL_NS,
     AbsentLegs,
 )
@@ -36,20 +38,25 @@ class Legs:
         self.absent = AbsentLegs(self.memory, 1_000_000_000)
         self._heard_ns, self.given = [0] * len(LEGS), np.zeros(12)
 
-    def step(self, faster: float = 1.0, dead: bool = False) -> tuple[Array, Array]:
-        """One tick; returns positions (12,) that are given out, and where the legs are."""
+    def step(self, faster: float = 1.0, dead: Sequence[int] | bool = (), off: Array | float = 0.0
+             ) -> tuple[Array, Array]:
+        """One tick; returns positions (12,) that are given out, and where the legs are: some are
+        dead, ``True`` for the first, and joints are off (12,) [rad].
+        """
+        dead = (DEAD,) if dead is True else dead or ()
         self.now += TICK_NS
         rate = faster * tau / PERIOD_S
         self._phase += rate * TICK_NS * 1e-9
-        wanted = np.array((self._size * np.sin(self._phase + self._lag),
+        wanted = np.array((self._size * np.sin(self._phase + self._lag) + off,
                            rate * self._size * np.cos(self._phase + self._lag), np.zeros(12)))
         for i, of in enumerate(JOINTS):
-            if not (dead and i == DEAD):
+            if i not in dead:
                 self.memory.accept(i, self.now, JointTargets(*wanted[:, of]))
                 self._heard_ns[i] = self.now
         ages = [self.now - heard_ns for heard_ns in self._heard_ns]
         targets = wanted.copy()
-        targets[:, JOINTS[DEAD]] = self.memory.acting(DEAD, self.now)[1]
+        for i, of in enumerate(JOINTS):
+            targets[:, of] = self.memory.acting(i, self.now)[1]
         if max(ages) > CARRIED_NS:
             self.absent.watch(self.now, ages)
         if self.absent.since_ns:
@@ -157,7 +164,7 @@ def test_after_a_disturbance_a_leg_alone_has_the_cycle_of_before_at_its_phase(se
     rest = remembered(walked)
     rest._known = memory._known
     assert rest.rhythm() is None
-    rhythm = rest.rhythm(alone=True)
+    rhythm = rest.rhythm(of_before=True)
     assert rhythm is not None and rhythm.of_before
     assert np.abs(rhythm.at(count * TICK_NS)[0] - walked[-1]).max() < 1e-9
     for ahead in range(int(period), 2 * int(period)):  # the difference has faded
@@ -167,7 +174,7 @@ def test_after_a_disturbance_a_leg_alone_has_the_cycle_of_before_at_its_phase(se
     absent.watch(count * TICK_NS, [CARRIED_NS + 1] * 4)
     assert absent.rhythm is None
     memory._known.end_ns -= KNOWN_NS
-    assert rest.rhythm(alone=True) is None  # that was too long ago
+    assert rest.rhythm(of_before=True) is None  # that was too long ago
     memory._known.end_ns += KNOWN_NS
     absent, late = AbsentLegs(rest, 1_000_000_000), [CARRIED_NS + 1, 0, 0, 0]
     for k in range(100):  # others are late too, first for a moment and then for longer
@@ -180,10 +187,41 @@ def test_after_a_disturbance_a_leg_alone_has_the_cycle_of_before_at_its_phase(se
     assert not any(absent._away_ns[2:])  # who is in time is followed
 
 
+@pytest.mark.parametrize('followed', [
+    SETTLED_NS // TICK_NS - 12, SETTLED_NS // TICK_NS + 3, 2 * SETTLED_NS // TICK_NS])
+def test_legs_that_have_been_followed_for_a_while_have_the_cycle_of_before_together(
+        followed: int) -> None:
+    legs, everyone = Legs(), tuple(range(len(LEGS)))
+    off = 0.12 * smooth(2, followed) / smooth(2, followed).std()
+    for _ in range(500):
+        legs.step()
+    for _ in range(50):
+        legs.step(dead=everyone)
+    while legs.absent.since_ns:
+        legs.step()
+    for tick in range(followed):
+        legs.step(off=off[tick])
+    assert legs.memory.rhythm() is None
+    for _ in range(CARRIED_NS // TICK_NS + 1):
+        legs.step(dead=everyone)
+    if followed * TICK_NS < SETTLED_NS:  # also when the first is known to be late
+        assert legs.absent.rhythm is None
+        return
+    assert legs.absent.rhythm is not None and legs.absent.rhythm.of_before
+    for _ in range(200):
+        given, wanted = legs.step(dead=everyone)
+    assert np.abs(given - wanted).max() < 0.2  # nothing is heard of what differs meanwhile
+    legs.absent.all_here()  # it has looked after itself
+    for i in range(len(LEGS)):
+        legs.memory.accept(i, legs.now, JointTargets(*np.zeros((3, 3))))
+    legs.absent.watch(legs.now, [CARRIED_NS + 1] * len(LEGS))
+    assert legs.absent.rhythm is None or not legs.absent.rhythm.of_before
+
+
 def test_what_resembles_no_phase_of_the_cycle_of_before_has_no_rhythm() -> None:
     turns = np.arange(500)[:, None] / (PERIOD_S / (TICK_NS * 1e-9))
     memory = remembered(np.sin(tau * (turns + np.linspace(0.0, 1.0, 12))))
     assert memory.rhythm() is not None
     elsewhere = remembered(smooth(1, 500))
     elsewhere._known = memory._known
-    assert elsewhere.rhythm(alone=True) is None
+    assert elsewhere.rhythm(of_before=True) is None
