@@ -25,8 +25,6 @@ from collections.abc import Callable, Generator
 from functools import lru_cache, partial
 from typing import IO, TYPE_CHECKING, Any, NamedTuple
 
-from rclpy.exceptions import InvalidHandle
-
 from dmp_cpg_ros.process import collect_seldom, show_command, show_name
 
 if TYPE_CHECKING:
@@ -189,7 +187,7 @@ def _computed(node: SuiteNode, compute: Compute, use: Use, result: Any) -> None:
         return
     task = node.guarded('beside ticks', lambda: use(
         compute() if isinstance(result, Exception) else result))
-    with contextlib.suppress(AttributeError, InvalidHandle):  # of an executor that was shut down
+    with contextlib.suppress(AttributeError, RuntimeError):  # of an executor that was shut down
         executor.create_task(task)
 
 
