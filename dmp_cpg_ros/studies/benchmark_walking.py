@@ -167,13 +167,14 @@ def killed_legs(workers: Workers, seeds: int, phases: int) -> Table:
 
 
 def twice_silent(workers: Workers, seeds: int, phases: int) -> Table:
-    """Falls, and stands at the second time, by how soon legs are silent once more."""
+    """Falls, and stands, by how soon legs are silent once more."""
     cells = [(*walk, *silent) for walk, silent in product(given.STARVED_WALKS, given.TWICE_SILENT)]
     results = run(workers, late_walks.twice_silent, [
         {'gait': gait, 'speed': speed, 'rate': rate, 'after_s': after_s, 'seed': seed + 1}
         for gait, speed, rate, after_s in cells for seed in range(seeds)])
     rows = [(f'{gait} {speed:g}', f'{rate:g}', f'{after_s:g}',
-             f'{sum(one.stood for one in of)}/{seeds}', f'{sum(one.fell for one in of)}/{seeds}')
+             f'{sum(one.stood > 0 for one in of)}/{seeds}',
+             f'{sum(one.fell for one in of)}/{seeds}')
             for (gait, speed, rate, after_s), of in by_cell(cells, results)]
     return Table('Legs that are silent twice', (
         'gait, m/s', 'control_rate Hz', 's between', 'stood', 'fell'), rows, results)

@@ -35,9 +35,6 @@ SILENT_S, TWICE_S = (0.35, 0.9), 6.0
 watched besides that between the two [s].
 """
 
-WAITED_MS = 15.0
-"""Ticks longer than that wait for the legs' targets, as those of ``mujoco_robot`` do [ms]."""
-
 TARGET_TIMEOUT_NS = round(1e9 * RobotParameters().target_timeout)
 
 
@@ -319,7 +316,7 @@ class TwiceSilentWalk(KilledWalk):
         self._after_s = after_s
         super().__init__(gait, seed, SILENT_S[1], rate)
         self._dies_ns = 10**18
-        if 1e3 / rate > WAITED_MS:
+        if 2.0 / rate > RobotParameters().longest_lag:  # mujoco_robot waits for such targets
             self._delay_ms = 0.0, 0.0
 
     def walks(self) -> None:

@@ -32,7 +32,7 @@ pytest.importorskip('mujoco')
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies import late_walks
-from dmp_cpg_ros.studies.late_walks import Stalls, late, starved
+from dmp_cpg_ros.studies.late_walks import Stalls, late, starved, twice_silent
 
 TICK_NS = 4_000_000
 LONGEST = CARRIED_NS // TICK_NS
@@ -171,6 +171,13 @@ def test_a_robot_whose_controllers_starve_again_and_again_stands_instead_of_star
     monkeypatch.setattr(late_walks, 'SOUND_NS', 1_000_000_000)
     outcome = starved('trot', 1.0, Stalls(400.0, 120.0, together=1.0, lost=0.2), seed)
     assert not outcome.fell and outcome.stood
+
+
+@pytest.mark.parametrize('seed', [1, 5])
+def test_a_robot_whose_legs_are_silent_once_more_after_a_second_walks_on(seed: int) -> None:
+    """It had no rhythm yet, and came to a stand."""
+    outcome = twice_silent('amble', 0.5, after_s=1.1, rate=50.0, seed=seed)
+    assert outcome.kills == 2 and not (outcome.fell or outcome.stood)
 
 
 @pytest.mark.parametrize(('rate', 'borne_ms'), [
