@@ -144,14 +144,22 @@ class Outcome:
 def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence[str],
         rng: random.Random, folder: Path, tell: Callable[[str], None] = lambda _: None,
         rate_hz: float = TickParameters.control_rate) -> Outcome:
-    """Walk, and kill some nodes one after the other; says how far it is."""
+    """Walk, and kill some nodes one after the other; says how far it is.
+
+    Raises
+    ------
+    DmpCpgError
+        If the suite does not come to walk.
+    """
     way = gait + ', lock-step' * lock_step
     tell(f'{way}: starts')
     walk = WalkProcess.of(folder, 3600.0, ahead(speed), *['--lock-step'] * lock_step,
                           *['--respawn'] * respawn, '--rate', f'{rate_hz:g}', gait=gait)
     outcome = Outcome(gait, lock_step, respawn, rate_hz=rate_hz)
-    going = walk.said('walking') < inf
-    for number, node in enumerate(nodes if going else ()):
+    if walk.said('walking') == inf:
+        walk.end()
+        raise walk.failure()
+    for number, node in enumerate(nodes):
         tell(f'{way}: {number} of {len(nodes)} kills')
         time.sleep(rng.uniform(2.0, 8.0))
         begin, together = len(walk.lines), node.split('+')

@@ -16,11 +16,13 @@ from dmp_cpg_ros.studies import study_faults
 from dmp_cpg_ros.suite import load_gaits
 
 
-class Stuck:
-    """A walk that never comes to walk, and does not end by itself."""
+class Refused(study_faults.WalkProcess):
+    """A walk that says why it does not walk, and does not end by itself."""
 
-    lines: list[str] = []
-    process = None
+    ended = 0
+
+    def __init__(self, _: object) -> None:
+        self.lines = ['walk: a suite is already running\n']
 
     def said(self, pattern: str, begin: int = 0) -> float:
         """Nothing."""
@@ -28,16 +30,21 @@ class Stuck:
 
     def end(self) -> int:
         """End it."""
+        Refused.ended += 1
         return 137
 
 
-def test_a_walk_that_never_walks_is_ended(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(study_faults.WalkProcess, 'of', lambda *_, **__: Stuck())
-    monkeypatch.setattr(study_faults, '_judge', lambda *_: None)
-    outcome = study_faults.run(
-        'amble', 0.5, False, False, ['inhibition'], random.Random(0), tmp_path)
-    assert (outcome.status, outcome.kills) == (137, [])
+def test_a_walk_that_never_walks_ends_the_study_with_what_it_says(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+        ) -> None:
+    """Sixteen walks that were refused were told as a table without a kill and without a fall."""
+    monkeypatch.setattr(study_faults, 'WalkProcess', Refused)
+    written = tmp_path / 'kills.json'
+    assert study_faults.main(['--rounds', '2', '--json', str(written)]) == 2
+    assert Refused.ended == 1 and not written.exists()
+    told = capsys.readouterr()
+    assert 'does not walk: walk: a suite is already running' in told.err
+    assert '| gait' not in told.out
 
 
 def recording(gait: str, off_s: tuple[float, float], slow_s: tuple[float, float],
@@ -95,9 +102,10 @@ def test_who_turns_in_phase_for_a_moment_only_is_not_in_phase_again(
     assert kills[1].in_phase_s == pytest.approx(8.5, abs=0.01)  # as far as is known
 
 
-class Told(Stuck):
+class Told:
     """A walk of which a robot came to a stand by itself after its first death."""
 
+    process = None
     lines = ['   1.00 s  walking\n', '   3.00 s  inhibition was ended by signal 9\n',
              '   3.20 s  all nodes are ready again\n', '   3.90 s  the robot looks after itself\n']
     deaths = iter((3.0, 8.0))
@@ -117,6 +125,10 @@ class Told(Stuck):
     def walks(self) -> bool:
         """It does."""
         return True
+
+    def end(self) -> int:
+        """End it."""
+        return 130
 
 
 def test_a_stand_is_told_with_the_death_before_it(
