@@ -299,16 +299,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _main(options: argparse.Namespace, ros: RosArguments) -> int:
     rng, outcomes = random.Random(options.seed), list[Outcome]()
-    tell = Progress(every_s=10.0)
+    tell, turns = Progress(every_s=10.0), dict[tuple[str, bool, bool], Iterator[str]]()
     for round_ in range(options.rounds):
         for respawn in options.respawn:
             for lock_step in options.lock_step:
                 for gait, speed in WALKS:
-                    nodes = list(options.nodes)
-                    together = min(options.together, len(nodes))
-                    rng.shuffle(nodes)
-                    turn = cycle(nodes)
-                    wanted = ['+'.join(islice(turn, together))
+                    way = gait, lock_step, respawn
+                    if respawn or way not in turns:
+                        nodes = list(options.nodes)
+                        rng.shuffle(nodes)
+                        turns[way] = cycle(nodes)
+                    together = min(options.together, len(options.nodes))
+                    wanted = ['+'.join(islice(turns[way], together))
                               for _ in range(options.kills if respawn else 1)]
                     with folder_of_logs(options.logs and (
                             options.logs / f'{len(outcomes):03}_{gait}')) as folder:

@@ -142,3 +142,19 @@ def test_a_stand_is_told_with_the_death_before_it(
     assert [kill.stood for kill in outcome.kills] == [True, False]
     (row,) = study_faults.rows([outcome])
     assert row[6] == '1 of 2'
+
+
+def test_each_node_has_its_turn_also_where_a_walk_ends_with_a_death(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    killed: list[tuple[str, str]] = []
+
+    def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: list[str],
+            *_: object) -> study_faults.Outcome:
+        killed.extend((gait, node) for node in nodes)
+        return study_faults.Outcome(gait, lock_step, respawn)
+
+    monkeypatch.setattr(study_faults, 'run', run)
+    rounds = str(len(study_faults.VICTIMS))
+    study_faults.main(['--rounds', rounds, '--respawn', 'no', '--lock-step', 'no'])
+    assert sorted(killed) == sorted(
+        (gait, node) for gait, _ in study_faults.WALKS for node in study_faults.VICTIMS)
