@@ -18,6 +18,7 @@ from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import CanonicalState
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.announced import Announced
+from dmp_cpg_ros.core.inhibition.blocked import InTime
 from dmp_cpg_ros.core.inhibition.handover import adopted
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.maths.constants import GRAVITY
@@ -90,7 +91,7 @@ class InhibitionNode(SuiteNode):
         self._waiting = WaitingRequests()
         self._blind = ''
         self._drive, self._joined, self._asked = FOLLOWING, False, False
-        self._began_ns = -1
+        self._began_ns, self._clock_ns, self._in_time = -1, 0, InTime()
         self._held: tuple[int, dict[str, Any]] | None = None
         self._told = ToldStop(self, tuple(gaits.gaits), self._voting.voting.voting)
         self._others = OthersKnow(self, self._take_up)
@@ -152,12 +153,14 @@ class InhibitionNode(SuiteNode):
         self._slow, before = self._unhurried(gait), self._state
         self._body_mode, margins, progress = values['posture_feedback'] or (
             self._body_mode, None, None)
+        self._in_time = self._in_time.at(stamp_ns, before.time_ns, self._clock_ns)
         self._votes = self._voting.step(
             self._votes, stamp_ns, network, _vote_sensors(stamp_ns, values), self._x, self._r,
             before.state in ('walking', 'free'), self._inbox.take(self._votes.memory.asks))
         self._state = self._supervisor.step(
             before, stamp_ns, network, self._x, self._x_dot, self._r, self._gate.at(stamp_ns),
-            self._votes.tally, self._barring, margins, progress, self.certified.changing(gait),
+            self._votes.tally, self._barring, margins,
+            self._in_time.of_obstacles(stamp_ns, progress), self.certified.changing(gait),
             self._lead_ns == 0 or self._announced.stops)
         self._announce()
         # it goes with a clock that is set back
@@ -276,6 +279,7 @@ class InhibitionNode(SuiteNode):
 
     def _watch(self, now_ns: int) -> None:
         """Notice on the robot's clock that nothing is known of the gait any more."""
+        self._clock_ns = now_ns
         if self._waiting.is_overdue(now_ns):
             self._waiting.refuse(self._refusal)
         if not self._joined:

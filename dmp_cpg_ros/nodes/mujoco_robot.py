@@ -45,6 +45,7 @@ from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.port import Robot, RobotError
 from dmp_cpg_ros.robot.robot_file import load_robot_file
+from dmp_cpg_ros.robot.slow_motion import SlowMotion
 from dmp_cpg_ros.robot.urdf import urdf
 from dmp_cpg_ros.strict_yaml import parse_yaml
 from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, ROBOT
@@ -80,13 +81,6 @@ it leads to runs before its publication ends.
 """
 
 
-def acts_too_long(age_ns: int, tick_ns: int, longest_ns: int) -> bool:
-    """Whether targets of an age beyond their time would act for longer than they may by the end of
-    the coming tick [ns]; new ones never do, nor any where ``longest_ns`` is 0.
-    """
-    return age_ns > 0 and 0 < longest_ns < age_ns + tick_ns
-
-
 class MujocoRobotNode(DrivenRobot):
     """Publishes the robot's state at every control tick and moves its joints to their targets."""
 
@@ -102,9 +96,12 @@ class MujocoRobotNode(DrivenRobot):
         names = self._robot.description.joint_names
         self._writer = RobotStateWriter(names)
         self._state = self._robot.reset()
-        self._fell, self._holding, self._open_until, self._waits = False, True, -1, 0
+        self._fell, self._holding, self._open_until = False, True, -1
         self._faults: FaultInjector | None = None
         self._arrived: dict[str, int] = {}
+        lag, lead, patience = (round(1e9 * seconds) for seconds in (
+            self._options.longest_lag, self._options.target_lead, self._options.target_timeout))
+        self._slow_motion = SlowMotion(self._tick_ns, lag, lead, patience)
         self._told = deque[dict[str, Any]](maxlen=2)
         work = () if self._state.joint_work is None else ('joint_work',)
         self._state_publishers = {name: self.publisher(name) for name in (*work, *STATE_TOPICS)}
@@ -284,7 +281,8 @@ class MujocoRobotNode(DrivenRobot):
 
     def _on_targets(self, message: Any) -> None:
         leg, stamp, targets = self.read_targets(message)
-        self._arrived[leg] = stamp  # what a lock-step waits for, believed or not
+        self._arrived[leg] = stamp  # what is waited for, believed or not
+        self._slow_motion.hear(leg, stamp, time.monotonic_ns())
         sent = [(leg, stamp, targets)]
         for arriving in sent if self._faults is None else self._faults.sent(sent):
             self._guard.accept(*arriving)
@@ -393,15 +391,9 @@ class MujocoRobotNode(DrivenRobot):
         """Whether to let wall time pass, so that a machine too slow for real time does not make
         the robot fall.
         """
-        now, lag = self._state.time_ns, round(self._options.longest_lag * 1e9)
-        if not acts_too_long(self._guard.age_ns(now), self._tick_ns, lag):
-            self._waits = 0
-            return False
-        self._waits += 1
-        if self._waits * self._tick_ns > self._options.target_timeout * 1e9:
-            return False
-        self._timing.waits += 1
-        return True
+        waits = self._slow_motion.waits(self._state.time_ns, time.monotonic_ns())
+        self._timing.waits += waits
+        return waits
 
     # Inside --------------------------------------------------------------------------------------
 

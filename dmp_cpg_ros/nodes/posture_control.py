@@ -45,6 +45,11 @@ from dmp_cpg_ros.suite_table import POSTURE
 FORGOTTEN_NS = 300_000_000
 """Gap after which the estimator begins anew [ns]: the robot has come to a stand by itself."""
 
+KEPT_NS = 40_000_000
+"""Gap after which a body counts as one that has kept its attitude [ns]: the turn rate at its end
+says nothing of what was between. At 1 rad/s, as in a trot, that makes 0.2 rad of a gap of 0.2 s.
+"""
+
 MOST_WAITED = 25
 """Ticks for which the estimator waits for an IMU before it goes on without."""
 
@@ -83,7 +88,7 @@ class BodyState:
         self._node = node
         self.estimate: BodyEstimate | None = None
         self._memory: EstimatorState | None = None
-        self._waited = 0
+        self._waited, self._tick_ns = 0, FORGOTTEN_NS
         self._estimator: BodyEstimator | None = None
         self.optional: tuple[str, ...] = ()
         self.readers: dict[str, Callable[[Any], Any]] = {
@@ -137,7 +142,9 @@ class BodyState:
         readings = sensor_readings(stamp_ns, values)
         memory = self._memory
         away_ns = stamp_ns - memory.estimate.time_ns if memory else 0
-        if memory and FORGOTTEN_NS < away_ns <= FORGOTTEN_NS + self._node.return_ns:
+        self._tick_ns = min(self._tick_ns, max(1, away_ns)) if memory else self._tick_ns
+        gap_ns = max(KEPT_NS, 2 * self._tick_ns)
+        if memory and gap_ns < away_ns <= FORGOTTEN_NS + self._node.return_ns:
             self._memory, estimate = self._estimator.resumed(memory, readings)
         else:
             self._memory, estimate = self._estimator.step(

@@ -191,15 +191,6 @@ class CommandWatchdog:
         """Whether the robot falls back while targets that come act too late."""
         return bool(self.fallback) and self.lateness_ns > CARRIED_NS
 
-    def age_ns(self, now_ns: int) -> int:
-        """Age, beyond the lead, of the oldest targets of the legs that are not silent [ns]; 0
-        while a leg has never sent any.
-        """
-        known = [stamp for stamp in self.stamps if stamp is not None]
-        ages = [now_ns - stamp for stamp in known if now_ns - stamp <= self._timeout_ns]
-        return max(0, max(ages, default=0) - self._lead_ns) if (
-            len(known) == len(self.stamps)) else 0
-
     def targets(self, state: RobotState) -> JointTargets:
         """Targets of all joints, (12,) each, at a state of the robot."""
         self.drives.see(state)

@@ -8,7 +8,7 @@ fast again when the body has half of its speed besides. The cycles until then co
 at which the robot follows its legs again, or at which all nodes are ready, whichever is earlier. A
 recorder that is killed leaves a bag that nobody has closed: what is told is how much of the time
 before the kill is not in it, and how many ticks are missing within. Exit status 1 when a robot
-fell, whose recording --logs keeps.
+fell; --logs keeps its recording, and that of a walk that did not go on.
 """
 
 from __future__ import annotations
@@ -139,6 +139,11 @@ class Outcome:
     fell: bool = False
     kills: list[Kill] = field(default_factory=list)
     rate_hz: float = TickParameters.control_rate
+
+    @property
+    def lost(self) -> bool:
+        """Whether it did not go on after its last death, from which nodes could come back."""
+        return self.respawn and bool(self.kills) and self.kills[-1].in_phase_s == inf
 
 
 def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence[str],
@@ -312,13 +317,14 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
                     together = min(options.together, len(options.nodes))
                     wanted = ['+'.join(islice(turns[way], together))
                               for _ in range(options.kills if respawn else 1)]
-                    with folder_of_logs(options.logs and (
-                            options.logs / f'{len(outcomes):03}_{gait}')) as folder:
+                    name = f'{len(outcomes):03}_{gait}'
+                    with folder_of_logs(options.logs and options.logs / name) as folder:
                         outcomes.append(run(
                             gait, speed, lock_step, respawn, wanted, rng, folder, tell,
                             options.rate))
-                        if outcomes[-1].fell and options.logs:
-                            shutil.copytree(folder / 'run', options.logs / f'fell_{folder.name}')
+                        lost = '_fell' * outcomes[-1].fell or '_lost' * outcomes[-1].lost
+                        if lost and options.logs:
+                            shutil.copytree(folder / 'run', options.logs / f'{name}{lost}')
                     print(f'round {round_}: {json.dumps(asdict(outcomes[-1]))}', flush=True)
                     write_results(options.json, [asdict(one) for one in outcomes])
     print(markdown_table(COLUMNS, list(rows(outcomes))))

@@ -50,6 +50,8 @@ class TFMessage:
 class CollectingNode:
     """What ``BodyState`` needs of a node; keeps copies of what is published."""
 
+    return_ns = 0
+
     def __init__(self) -> None:
         self.sent: dict[str, list[Any]] = defaultdict(list)
         self.said: list[str] = []

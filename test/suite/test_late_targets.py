@@ -18,6 +18,7 @@ from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.suite_parameters import RobotParameters
 from dmp_cpg_ros.robot.absent_legs import CARRIED_NS, IN_TIME_NS
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
+from dmp_cpg_ros.robot.slow_motion import SlowMotion, acts_too_long
 from dmp_cpg_ros.robot.watchdog import (
     AGAIN_NS,
     AT_EASE_NS,
@@ -97,7 +98,7 @@ def test_what_comes_within_the_lead_acts_at_its_end_however_it_came(
             max(0, now - lead)]
         assert all(np.array_equal(*pair) for pair in zip(
             vars(given_out).values(), vars(wanted).values(), strict=True))
-        assert guard.age_ns(now * TICK_NS) == 0
+        assert guard.lateness_ns == 0
 
 
 @pytest.mark.parametrize('away', [0.02, 0.5])
@@ -185,12 +186,46 @@ def test_a_robot_whose_legs_are_silent_once_more_after_a_second_walks_on(seed: i
 def test_the_simulation_waits_rather_than_let_targets_act_too_long(
         rate: int, borne_ms: int) -> None:
     """At 50 Hz those that come a tick late throw over an amble that bears 20 ms at 100 Hz."""
-    acts_too_long = pytest.importorskip('dmp_cpg_ros.nodes.mujoco_robot').acts_too_long
     tick_ns, longest_ns = 10**9 // rate, round(1e9 * RobotParameters().longest_lag)
     ages = [age for age in range(0, 10**8, tick_ns)
             if not acts_too_long(age, tick_ns, longest_ns)]
     assert max(ages) == borne_ms * 1_000_000 and 0 in ages
     assert not acts_too_long(10**9, tick_ns, 0)
+
+
+@pytest.mark.parametrize('capacity', [1.0, 0.6, 0.3])
+def test_a_simulation_whose_controllers_cannot_keep_up_is_answered_in_time_again(
+        capacity: float) -> None:
+    """Controllers that work off less than a state a tick get it in the end: they were left behind
+    farther and farther by a robot that looked after itself, for 75 s in a walk. Two seconds of
+    nothing, as while a node comes back, are not waited for.
+    """
+    motion = SlowMotion(TICK_NS, round(1e9 * RobotParameters().longest_lag), 0, 200_000_000)
+    now, done, answered, ages, waited = 0, 0.0, 0, [], 0
+    for k in range(4000):
+        away = 250 <= k < 750  # nobody works off anything
+        done += 0.0 if away else min(capacity, now // TICK_NS - done)
+        if int(done) > answered or not k:
+            answered = int(done)
+            for leg in LEGS:
+                motion.hear(leg, answered * TICK_NS, k * TICK_NS)
+        waits = motion.waits(now, k * TICK_NS)
+        now, waited = now + TICK_NS * (not waits), waited + TICK_NS * (waits and away)
+        ages.append(now - answered * TICK_NS)
+    assert waited <= 200_000_000 + TICK_NS and ages[749] > 10**9  # nobody was waited for longer
+    assert max(ages[-500:]) <= 32_000_000
+    assert done > 0.9 * capacity * (len(ages) - 500)  # and they had never to wait for the robot
+
+
+def test_a_leg_whose_targets_come_no_sooner_is_waited_for_now_and_then_only() -> None:
+    motion, wall, waited = SlowMotion(TICK_NS, 30_000_000, 0, 200_000_000), 0, 0
+    for now in range(0, 4 * 10**9, TICK_NS):
+        for leg in LEGS:
+            motion.hear(leg, now - 400_000_000 * (leg == 'fl'), wall)
+        while motion.waits(now, wall):
+            wall, waited = wall + TICK_NS, waited + TICK_NS
+        wall += TICK_NS
+    assert 0 < waited < 0.5 * 4 * 10**9
 
 
 def test_who_has_looked_after_itself_again_and_again_follows_later_each_time(

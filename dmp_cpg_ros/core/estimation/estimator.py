@@ -205,7 +205,9 @@ class BodyEstimator:
         """
         seeing, moving = readings.imu_is_usable, mid_stride.moves(readings)
         up = readings.specific_force_in_base if seeing else np.array((0.0, 0.0, 1.0))
-        up, zero = mid_stride.steadied(up) if moving else up, (0.0, 0.0, 0.0)
+        zero = 0.0, 0.0, 0.0
+        if moving:
+            up = mid_stride.steadied(up, walks=mid_stride.on_feet(readings, self._weight))
         covariance = np.diag(np.repeat(np.square(INITIAL_DEVIATION), 3))
         state = FilterState(levelled(up), zero, zero, zero, covariance)
         if before is not None:

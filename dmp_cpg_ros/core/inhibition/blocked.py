@@ -15,6 +15,7 @@ is that it does not come ahead although its legs walk (:class:`Progress`).
   ``PATIENCE`` l, with u up to ``BRISK`` √(g l) counted, it is blocked: a stop is requested as the
   service does, with its prediction and its bound; at once where a foot meets what is too high
   (:mod:`~dmp_cpg_ros.core.balance.terrain`).
+  Where the legs' targets come too late to be followed, feet tell nothing (:class:`InTime`).
 
 It stays stopped while the same is asked: a command within 60° of the way that was blocked does not
 start the gait. The service does, a command that leads elsewhere (back, aside or a turn on the
@@ -26,6 +27,7 @@ from __future__ import annotations
 from math import exp, hypot
 from typing import NamedTuple
 
+from dmp_cpg_ros.core.clock import fresh
 from dmp_cpg_ros.core.inhibition.caution import LEAST
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
@@ -63,6 +65,11 @@ it is blocked, in lengths of the leg.
 SLOW, BRISK = 0.04, 0.15
 """Speeds in √(g l): below the first nothing is asked, beyond the second no more is counted."""
 
+LATE_NS, SETTLES_NS = 80_000_000, 500_000_000
+"""Age of what is heard of the gait, or time without, beyond which the legs' targets come too late
+to be followed, and time for which it must have been less until feet tell of obstacles again [ns].
+"""
+
 SAME_WAY = 0.5
 """Cosine between two directions that count as the same."""
 
@@ -95,6 +102,33 @@ class Progress(NamedTuple):
     rough: float = 0.0
     gaps: float = 0.0
     high: float = 0.0
+
+
+class InTime(NamedTuple):
+    """Whether the legs do what the gait has them do, as far as news of it come in time. A robot
+    whose targets are late goes on with its last rhythm, and its feet are elsewhere: that is no
+    obstacle.
+
+    Attributes
+    ----------
+    late_ns : int
+        Stamp of the last tick that came late [ns].
+    """
+
+    late_ns: int = -SETTLES_NS
+
+    def at(self, stamp_ns: int, before_ns: int, now_ns: int) -> InTime:
+        """After a tick, the stamp of the one before, and the newest time that is known [ns]."""
+        return InTime(stamp_ns) if max(
+            now_ns - stamp_ns, stamp_ns - before_ns) > LATE_NS else self
+
+    def of_obstacles(self, stamp_ns: int, progress: Progress | None) -> Progress | None:
+        """Progress at a stamp [ns], without what feet tell of obstacles while they are late, or
+        were a moment ago.
+        """
+        if progress is None or not fresh(self.late_ns, stamp_ns, SETTLES_NS):
+            return progress
+        return progress._replace(behind=0.0, high=0.0)
 
 
 class BlockState(NamedTuple):

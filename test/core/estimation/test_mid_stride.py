@@ -4,11 +4,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from core_examples import quadruped, standing_state
 
-from dmp_cpg_ros.core.estimation.mid_stride import steadied
+from dmp_cpg_ros.core.estimation.body_estimate import estimated_state
+from dmp_cpg_ros.core.estimation.mid_stride import on_feet, steadied
 from dmp_cpg_ros.core.maths import vec3
+from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.studies import change_trials
 from dmp_cpg_ros.studies.walking_trials import Walk
 
@@ -34,6 +39,23 @@ def test_it_finds_the_body_nearly_level_and_as_fast_as_it_is(gait: str, speed: f
     assert np.median(velocities) < 0.05
 
 
+@pytest.mark.parametrize(('gait', 'speed'), [('trot', 2.0), ('bound', 0.5)])
+def test_whenever_it_begins_the_body_is_found_standing(gait: str, speed: float) -> None:
+    """One reading in fifteen of a bound, and of a trot one in some hundreds, is as long as in rest
+    and far off the vertical: a robot that walked was taken for fallen, and its joints were damped.
+    """
+    run = Walk(gait, seed=3)
+    run.loop.command(speed)
+    body, estimator, found = run.loop.body, run.loop.estimator, set()
+    assert estimator is not None and run.walk(0.3)
+    for _ in range(500):
+        assert run.walk(0.012)
+        _, estimate = estimator.step(None, readings_of(run.state))
+        state = estimated_state(readings_of(run.state), estimate)
+        found.add(body.picked_up(body.initial_state(), state).mode.mode)
+    assert found == {'standing'}
+
+
 def test_a_pace_whose_posture_control_begins_anew_walks_on(
         monkeypatch: pytest.MonkeyPatch) -> None:
     """Taken for a robot at rest it fell at most phases."""
@@ -53,3 +75,14 @@ def test_a_pace_whose_posture_control_begins_anew_walks_on(
 def test_one_reading_tells_a_moving_body_little(
         force: tuple[float, float, float], up: tuple[float, float, float]) -> None:
     np.testing.assert_allclose(steadied(np.array(force)), up, atol=1e-12)
+
+
+def test_what_carries_a_body_tells_whether_it_is_on_its_feet() -> None:
+    """A reading far off the vertical is believed of a body that its feet do not carry."""
+    weight, state = 120.0, standing_state(quadruped(), 0)
+    aside = replace(readings_of(state), specific_force_in_base=np.array((9.0, 0.0, 4.0)))
+    for feet, walks in ((0.0, False), (0.2, False), (0.5, True), (np.nan, False)):
+        force = np.array((0.25 * feet * weight,) * 4)
+        assert on_feet(replace(aside, foot_force=force), weight) is walks
+    np.testing.assert_allclose(
+        steadied(aside.specific_force_in_base, walks=True), (0.0, 0.0, 1.0), atol=1e-12)

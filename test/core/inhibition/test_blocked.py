@@ -31,14 +31,17 @@ from dmp_cpg_ros.core.inhibition.blocked import (
     FEET_HELD,
     FIRM,
     HELD,
+    LATE_NS,
     NO_BLOCK,
     NO_WAY,
     PATIENCE,
     PINNED,
+    SETTLES_NS,
     SLOW,
     SLUGGISH,
     STEP,
     TOO_HIGH,
+    InTime,
     Progress,
     block_step,
 )
@@ -178,6 +181,27 @@ def test_a_body_waits_for_feet_that_are_held_and_stops_when_they_stay_so() -> No
         state, ticks = block_step(state, r, 0.5, held, LENGTH, TICK), ticks + 1
     assert ticks * TICK * BRISK * FROUDE == pytest.approx(FIRM * LENGTH, rel=0.1)
     assert state.why == FEET_HELD
+
+
+@pytest.mark.parametrize('gap_ns, lag_ns', [(LATE_NS + 1, 0), (4_000_000, LATE_NS + 1)])
+def test_feet_of_legs_whose_targets_come_late_are_no_obstacle(gap_ns: int, lag_ns: int) -> None:
+    """A robot that went on with its last rhythm while a node came back was taken for blocked, and
+    stood for good.
+    """
+    held = Progress((0.1, 0.0), (PINNED + 0.2) * LENGTH, rough=0.01, high=1.0)
+    in_time, now = InTime(), 10**9
+    assert in_time.of_obstacles(now, held) is held
+    in_time = in_time.at(now, now - 4_000_000, now + 30_000_000)  # as late as it may be
+    assert in_time.of_obstacles(now, held) is held
+    in_time = in_time.at(now, now - gap_ns, now + lag_ns)
+    told = in_time.of_obstacles(now, held)
+    assert told is not None and not block_step(
+        NO_BLOCK, np.array((0.5, 0.0, 0.0)), 0.5, told, LENGTH, 1.0).why
+    assert (told.velocity, told.rough) == (held.velocity, held.rough)
+    later = now + SETTLES_NS
+    assert in_time.at(later, later - 4_000_000, 0).of_obstacles(later, held) == told
+    assert in_time.of_obstacles(later + 1, held) is held
+    assert in_time.of_obstacles(now, None) is None
 
 
 @pytest.mark.parametrize('caution', [True, False])
