@@ -184,7 +184,7 @@ class SuiteWatch:
         if now > self._reminded_s + REMIND_S:
             self._reminded_s = now
             player.remind()
-        if self._stalled.due() and progress[0] > 0 and self._returning is None:
+        if self._stalled.due() and player.begun and self._returning is None:
             # Ticks that go on while the robot looks after itself need no word, and shall not have
             # one by the wall clock.
             stands, self._stood_ns = progress[0] == self._stood_ns, progress[0]

@@ -164,6 +164,7 @@ def read_state(writer: RobotStateWriter) -> RobotState:
     assert bits(rate, acceleration) == bits(*read_imu(writer.imu))
     assert imu.orientation_covariance[0] == -1.0  # ROS for: there is no orientation
     base = read_odom(wire(writer.ground_truth))
+    assert bits(*base) == bits(*read_odom(writer.ground_truth))  # as nodes of one process have it
     stamps = {header_ns(message) for message in (
         writer.joint_states, writer.imu, writer.ground_truth, writer.foot_contacts)}
     assert stamps == {stamp_ns(writer.clock.clock)}

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from dmp_cpg_ros.core.contraction.synchronisation import (
     invariant_radius,
     overshoot,
 )
-from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.maths import Array
 
 _BOXES = 512
@@ -49,16 +50,29 @@ def needed_gain_anywhere(system: CanonicalSystem, omega: float, node: int,
     Returns
     -------
     float
-        max over n of (n·f_i(x_d + r0 n) + Σ_j (‖K_ij‖ R − λ_min(K_ij) n·x_i)) / r0, rounded up
-        [1/s], with R of the disc that no oscillator leaves and no target is out of.
+        max over n of (n·f_i(x_d + r0 n) + Σ_j k_ij (R − n·x_i)) / r0, rounded up [1/s], with R of
+        the disc that no oscillator leaves and no target is out of. Where K_ij are no multiples of
+        I, n·K_ij x_d is not k_ij n·x_d, and Σ_j (‖K_ij‖ (R + |x_d|) − λ_min(K_ij) r0) takes the
+        place of the sum.
+
+    Raises
+    ------
+    ParameterError
+        For a node that there is not, or a region without a positive radius.
     """
+    if not 0 <= node < len(system.target):
+        raise ParameterError(f'node = {node} must be in [0, {len(system.target) - 1}]')
+    if not 0.0 < region_radius < inf:
+        raise ParameterError(f'region_radius = {region_radius} must be positive and finite')
     reach = float(np.linalg.norm(system.target[node]))
     laplacian = comparison_laplacian(system.graph)
     largest = invariant_radius(max(float(system.radius.max()), reach), overshoot(laplacian),
                                float(system.rho.min()))
     L = laplacian[node]
     held, pulled = float(L[node]), float(-L[np.arange(len(L)) != node].sum())
-    turning, pull = Interval.of(abs(omega)) * reach, Interval.of(pulled) * largest
+    scalar = system.graph.weights is not None
+    turning, pull = Interval.of(abs(omega)) * reach, Interval.of(pulled) * (
+        largest if scalar else Interval.of(largest) + reach)
     rho, r_squared = float(system.rho[node]), Interval.of(float(system.radius[node])).square()
     both = Interval.of(reach).square() + Interval.of(region_radius).square()
 
@@ -68,7 +82,8 @@ def needed_gain_anywhere(system: CanonicalSystem, omega: float, node: int,
         along = cosine * reach + region_radius                               # n·x_i
         squared = cosine * (2.0 * reach * region_radius) + both
         radial = rho * ((r_squared - squared) * along)
-        return sine * turning + radial + pull - held * along
+        return sine * turning + radial + pull - held * (
+            along if scalar else Interval.of(region_radius))
 
     return float((Interval.of(_maximum(outward)) / region_radius).upper)
 

@@ -36,6 +36,7 @@ from dmp_cpg_ros.core.contraction.capture import (
 )
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian, slowest_rate
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 
@@ -59,6 +60,11 @@ class Capture:
         r0 of C.
     places, radii : float
         How far legs may be from each other's places, and radii from r, when C is entered.
+
+    Raises
+    ------
+    ParameterError
+        If ω is not positive and finite.
     """
 
     system: CanonicalSystem
@@ -67,6 +73,11 @@ class Capture:
     region_radius: float
     places: float
     radii: float
+
+    def __post_init__(self) -> None:
+        """Refuse oscillators that do not turn as they are to."""
+        if not 0.0 < self.omega < inf:
+            raise ParameterError(f'omega = {self.omega} rad/s must be positive and finite')
 
     @cached_property
     def undelayed(self) -> CaptureSet:

@@ -103,7 +103,7 @@ def equilibrium_up_to(system: CanonicalSystem, omega: float | Array, gains: Arra
     It is looked for at once, near where it would be if couplings were springs. Where none is there
     that is stable, it is followed from where it is known or from the targets.
     """
-    begin = system.target if known is None else known
+    begin = _in_place(system, gains) if known is None else known
     near = _ahead(system, begin, (1.0 - share) * omega, gains)
     whole = None if near is None else _newton(system, near, omega, gains)
     if whole is not None:
@@ -125,6 +125,17 @@ def equilibrium_up_to(system: CanonicalSystem, omega: float | Array, gains: Arra
         if share == 1.0 or (following is None and step <= _SMALLEST_STEP):
             break
     return None if share < 1.0 else described(system, x, omega, gains), share
+
+
+def _in_place(system: CanonicalSystem, gains: Array) -> Array:
+    """Targets (N, 2); of nodes that are not inhibited, of which none acts, the places beside the
+    first one that is.
+    """
+    first = int(np.argmax(gains > 0.0))
+    places = turned(np.broadcast_to(system.target[first], system.target.shape),
+                    system.graph.phases - system.graph.phases[first])
+    away = (gains <= 0.0) & (_lengths(places - system.target) > 1e-6 * system.radius)
+    return np.where(away[:, None] & bool(gains.any()), places, system.target)
 
 
 def _ahead(system: CanonicalSystem, x: Array, omega: float | Array, gains: Array) -> Array | None:

@@ -65,7 +65,8 @@ def request(modes: ModeManager, state: ModeState, what: str) -> tuple[ModeState,
         return _recover(modes, state)
     if mode == 'stopping':
         return enter(state, 'standing', (), 'lying down was called off'), ModeAnswer(
-            True, 'stays standing, the gait inhibited; resume it with the service inhibit')
+            True, 'stays standing; the gait goes on at a command, unless the service inhibit has '
+            'stopped it')
     if mode == 'standing':
         return enter(state, 'stopping', (), 'asked to lie down'), ModeAnswer(
             True, f'lying {duration(("lower",)):.2f} s after the gait has come to rest; it is '

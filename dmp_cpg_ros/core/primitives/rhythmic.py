@@ -280,17 +280,21 @@ def _squared_radius(squared: float, rho: float, radii: Array, density: Array, le
     """Squared radius after a step: 1/R² = e^{−P}/R₀² + ∫ e^{p − P}/r² dp, p = 2ρ ∫ r² ds.
 
     P is p at the end. 1/r² is replaced by the quadratic in p through three nodes, and the integral
-    is then taken exactly.
+    is then taken exactly; where r changes so fast that this is not between the bounds of 1/r², the
+    nearer bound is.
     """
     rate = 2.0 * rho * radii**2 * density  # dp/du at the nodes
     p_middle = length * float(rate @ (5.0, 8.0, -1.0)) / 24.0
     p_end = length * float(rate @ (1.0, 4.0, 1.0)) / 6.0
     values = 1.0 / radii**2
+    one = -np.expm1(-p_end)  # ∫ e^{p − P} dp
+    if not 0.0 < p_middle < p_end:
+        return float(1.0 / (np.exp(-p_end) / squared + values[1] * one))
     # Newton's divided differences
     slope = (values[1] - values[0]) / p_middle
     bend = ((values[2] - values[1]) / (p_end - p_middle) - slope) / p_end
-    one = -np.expm1(-p_end)  # ∫ e^{p − P} dp
     first = p_end - one  # ∫ e^{p − P} p dp
     second = p_end**2 - 2.0 * first  # ∫ e^{p − P} p² dp
     integral = values[0] * one + slope * first + bend * (second - p_middle * first)
+    integral = min(max(integral, values.min() * one), values.max() * one)
     return float(1.0 / (np.exp(-p_end) / squared + integral))

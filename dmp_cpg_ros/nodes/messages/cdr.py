@@ -153,7 +153,7 @@ class SerializedImu(Serialized):
 
 
 class SerializedOdometry(Serialized):
-    """A serialized ``Odometry``, which the suite only writes."""
+    """A serialized ``Odometry``, of which the suite reads no part by itself."""
 
     __slots__ = ()
     KIND = Odometry

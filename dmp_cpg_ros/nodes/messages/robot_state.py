@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from nav_msgs.msg import Odometry
+from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 
@@ -183,8 +184,12 @@ class BaseMotion(NamedTuple):
     rate_in_base: Array
 
 
-def read_odom(message: Odometry) -> BaseMotion:
-    """Read an ``Odometry``; raises DataError, also for a quaternion that is no rotation."""
+def read_odom(message: Odometry | cdr.SerializedOdometry) -> BaseMotion:
+    """Read an ``Odometry``, also as a writer of the same process hands it over; raises DataError,
+    also for a quaternion that is no rotation.
+    """
+    if isinstance(message, cdr.SerializedOdometry):
+        message = deserialize_message(message.serialized, Odometry)
     pose, twist = message.pose.pose, message.twist.twist
     q = pose.orientation
     quaternion = _rotation((q.x, q.y, q.z, q.w))

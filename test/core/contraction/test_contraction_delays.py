@@ -11,6 +11,7 @@ import pytest
 
 from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.contraction.delays import Capture, asked_premises, carried_premises
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.studies.delayed_runs import PATTERNS, fails
 from dmp_cpg_ros.studies.delays import MARGINS, capture_of, gait_captures, random_captures
 
@@ -166,3 +167,10 @@ def test_locked_legs_stay_so_and_come_together_with_carried_states_of_any_age(
         assert seen[-1].real.min() >= r * np.cos(half) - 1e-12
         spread.append(float(np.max(np.ptp(np.angle(seen), axis=(0, 2)))))
     assert spread[-1] < 0.05 * spread[0]
+
+
+@pytest.mark.parametrize('omega', [-3.9, 0.0, float('nan'), float('inf')])
+def test_oscillators_that_do_not_turn_as_they_are_to_have_no_margin(omega: float) -> None:
+    """Backwards, every age was borne by a network of which 0.39 s are."""
+    with pytest.raises(ParameterError, match='omega'):
+        replace(next(iter(gait_captures()))[1], omega=omega)

@@ -129,3 +129,15 @@ def test_at_zero_frequency_everyone_rests_in_place() -> None:
     rest = inhibited_equilibrium(system('ring', 50.0), 0.0, np.array([0.0, 300.0, 0.0, 0.0]))
     assert rest is not None
     assert np.allclose(rest.phase_ahead, 0.0) and np.allclose(rest.radius, 1.0)
+
+
+def test_targets_of_nodes_that_are_not_inhibited_decide_nothing() -> None:
+    """None of them acts; without targets of its own every oscillator has that of phase 0, from
+    which nothing was found for a gait.
+    """
+    phases, gains = -2.0 * np.pi * np.array((0.0, 0.5, 0.75, 0.25)), np.array((400.0, 0, 0, 0))
+    graph = graph_from_edges(4, topology('ring', 4), 60.0, phases)
+    plain, placed = (inhibited_equilibrium(CanonicalSystem(graph, AndronovHopf(8.0), *target),
+                                           9.0, gains) for target in ((), (state_at(phases),)))
+    assert plain is not None and placed is not None and plain.slowest_rate > 0.0
+    np.testing.assert_allclose(plain.state, placed.state, atol=1e-9)

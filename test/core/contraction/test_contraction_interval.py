@@ -11,8 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.contraction.capture_anywhere import Interval
-from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.contraction.capture_anywhere import Interval, needed_gain_anywhere
+from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.paper.matrix_measure import stack
 
 NUMBERS = st.floats(-1e6, 1e6, allow_subnormal=False)
@@ -92,3 +95,28 @@ def test_middle_and_radius_cover_the_interval() -> None:
     x = Interval(np.array(0.1), np.array(0.7))
     assert float(x.middle - x.radius) <= 0.1 and float(x.middle + x.radius) >= 0.7
     assert float(Interval(np.array(-3.0), np.array(1.0)).magnitude) == 3.0
+
+
+@pytest.mark.parametrize('coupling', [
+    60.0 * np.eye(2), np.array([[60.0, 30.0], [-30.0, 60.0]]), np.diag((60.0, 1.0)),
+    np.array([[30.5, 29.5], [29.5, 30.5]])])
+@pytest.mark.parametrize('r0', [0.1, 0.5])
+def test_wherever_the_others_are_the_field_points_into_the_region(
+        coupling: np.ndarray, r0: float) -> None:
+    """With couplings that turn, or that are not the same in all directions, C was left."""
+    system = CanonicalSystem(graph_from_edges(2, topology('path', 2), coupling),
+                             AndronovHopf(200.0, 1.0))
+    gains = np.array([1.001 * needed_gain_anywhere(system, 2.0, 0, r0), 0.0])
+    for angle in np.linspace(0.0, 2.0 * np.pi, 361):
+        n = np.array((np.cos(angle), np.sin(angle)))
+        pulls = coupling.T @ n
+        x = np.array([system.target[0] + r0 * n * (1.0 - 1e-12), pulls / np.linalg.norm(pulls)])
+        assert n @ system.field(x, 2.0, gains)[0] < 0.0
+
+
+@pytest.mark.parametrize(('node', 'r0'), [(-1, 0.3), (2, 0.3), (0, -0.3), (0, 0.0),
+                                          (0, float('nan'))])
+def test_a_node_that_is_none_and_a_region_without_radius_are_refused(node: int, r0: float) -> None:
+    system = CanonicalSystem(graph_from_edges(2, topology('path', 2), 60.0), AndronovHopf(8.0))
+    with pytest.raises(ParameterError, match='must be'):
+        needed_gain_anywhere(system, 2.0, node, r0)

@@ -253,3 +253,15 @@ def test_bad_primitives_are_refused(change):
 def test_bad_inputs_are_refused(command):
     with pytest.raises(ParameterError, match='positive finite'):
         primitive().step(primitive().initial_state(), command, 0.01)
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('seconds', [30.0, 60.0])
+@pytest.mark.parametrize('amplitude', [0.05, 10.0, 20.0])
+def test_long_steps_bear_an_amplitude_that_changes_fast(seconds: float, amplitude: float) -> None:
+    """They ended in NaN, or 39 % beside the movement."""
+    slow = replace(primitive(), omega=OMEGA / seconds)
+    asked = RhythmicInput(slow.centre, amplitude)
+    coarse, fine = (slow.rollout(np.linspace(0.0, seconds, count), asked,
+                                 slow.initial_state()).positions for count in (21, 4001))
+    assert np.abs(coarse - fine[::200]).max() < 0.1 * np.ptp(fine)
