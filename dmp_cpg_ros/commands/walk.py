@@ -81,6 +81,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _main(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> int:
     ros.namespace = ros_arguments.checked_namespace(options.namespace or ros.namespace)
+    if '__node' in dict(ros.remappings):
+        raise ParameterError('walk runs several nodes, which cannot all have the name '
+                             f"'{dict(ros.remappings)['__node']}'; valid is -r __ns:=NAMESPACE")
     from dmp_cpg_ros.commands.fork_server import ForkServer
 
     with ForkServer() as server:  # imports what nodes need while this process does

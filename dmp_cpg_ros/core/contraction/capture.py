@@ -122,6 +122,8 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     if not (np.isfinite(omega).all() and np.isfinite(gains).all() and (gains >= 0.0).all()):
         raise ParameterError(f'frequencies {omega.tolist()} must be finite, and gains '
                              f'{gains.tolist()} finite and not negative')
+    if not 0.0 <= places < np.inf:
+        raise ParameterError(f'places = {places!r} must be finite and not negative')
     inhibited = gains > 0.0
     D, L, largest, u, needed = _box(
         system, omega.tobytes(), inhibited.tobytes(), float(region_radius))
@@ -131,7 +133,8 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     if not contracts:
         return CaptureSet(u, np.zeros(size), needed, gains, tolerance, -np.inf)
     M = L + np.diag(gains)
-    inner = _smallest_radii(system, M, omega, u, D, region_radius, largest, tolerance)
+    inner = np.maximum(0.0, D - u) if overshoot(L) > 0.0 else _smallest_radii(
+        system, M, omega, u, D, region_radius, largest, tolerance)
     rate = slowest_rate(M - np.diag(growth(system.rho, system.radius, inner)))
     return CaptureSet(u, inner, needed, gains, tolerance, rate)
 
@@ -301,13 +304,13 @@ def _smallest_radii(system: CanonicalSystem, M: Array, omega: Array, u: Array, D
     """Lower bounds on |x_i|: the box itself, and invariant half-planes n_β·x_i ≥ c_i.
 
     On the face of a half-plane the rotation takes away ω t, t the largest extent along the flow,
-    the coupling averages the c_j and inhibition pulls towards n_β·x_d; so c = n_β·x_d − s with
-    M s ≥ ω t suffices, as long as every state at capture is inside and no c is negative: there
-    the radial part would push outwards.
+    the coupling, for K_ij = k_ij I, averages the c_j and inhibition pulls towards n_β·x_d; so
+    c = n_β·x_d − s with M s ≥ ω t suffices, as long as every state at capture is inside and no c
+    is negative: there the radial part would push outwards.
     """
     inner = np.maximum(0.0, D - u)
     tiny = 1e-9 * float(np.abs(M).max())
-    if (M.sum(axis=1) < -tiny).any() or slowest_rate(M) <= tiny:
+    if slowest_rate(M) <= tiny:
         return inner
     extent = np.clip(u - D * _SINE, 0.0, largest)                        # (13, N)
     loss = omega * extent + system.rho * np.maximum(largest**2 - system.radius**2, 0.0) * largest

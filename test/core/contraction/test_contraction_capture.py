@@ -13,7 +13,7 @@ from contraction_batches import Batch, Setting, locked, random_setting
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
@@ -301,3 +301,29 @@ def test_a_leader_that_the_others_do_not_hear_captures_itself_and_stops_nobody()
     capture = capture_set(system, 10.0, held_by(0, 2000.0), 0.3)
     assert np.all(capture.distance[1:] >= 2.0)
     assert inhibited_contraction(system, capture).reach == NONE
+
+
+def test_couplings_that_turn_have_no_half_planes() -> None:
+    """They do not average heights: where only the inhibited node feels such ones, a state passed
+    the smallest radius that half-planes gave.
+    """
+    a, b = 35.3008, 12.9288
+    K = np.array([a * np.eye(2) + b * np.array([[0.0, 1.0], [-1.0, 0.0]]), 2.0 * a * np.eye(2)])
+    system = CanonicalSystem(CouplingGraph(2, ((0, 1), (1, 0)), K, np.zeros(2)),
+                             AndronovHopf(5.8177, 1.0))
+    gains = np.array([22.4327902506203, 0.0])
+    found = capture_set(system, 0.4953, gains, 0.5848694861389775)
+    x = np.array([[0.77181, 0.0], [0.72930, -0.525]])
+    for _ in range(200):
+        x = system.step(x, 0.4953, gains, 1e-4)
+        assert np.all(np.hypot(*x.T) >= found.smallest_radius)
+    plain = CanonicalSystem(graph_from_edges(2, topology('path', 2), a), AndronovHopf(5.8177))
+    rest = capture_set(plain, 0.4953, gains, 0.5848694861389775)
+    assert np.all(rest.smallest_radius > 1.0 - rest.distance)
+
+
+@pytest.mark.parametrize('places', [-1.0, float('nan'), float('inf')])
+def test_a_tolerance_that_is_none_is_refused(places: float) -> None:
+    network = CanonicalSystem(graph_from_edges(2, topology('path', 2), 60.0), AndronovHopf(8.0))
+    with pytest.raises(ParameterError, match='places'):
+        capture_set(network, 2.0, np.array([100.0, 0.0]), 0.3, places)
