@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Folders of runs: those that begin at the same time, and the parameters that a run is given."""
+"""Folders of runs: those that begin at the same time, and what a run is given."""
 
 from __future__ import annotations
 
@@ -54,3 +54,13 @@ def test_the_return_time_of_the_parameter_file_wins(
             values := written[f'/**/{name}']['ros__parameters'])}
         expected = dict.fromkeys(WALKING_NODES, RETURN_S) if options == ('--respawn',) else {}
         assert told == expected | ({ROBOT: 0.25} if number else {})
+
+
+def test_nodes_of_a_walk_are_not_given_one_name(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+        ) -> None:
+    """The second one took the first for another suite in the domain."""
+    monkeypatch.chdir(tmp_path)
+    assert walk.main(['--ros-args', '-r', '__node:=foo']) == 2
+    assert "cannot all have the name 'foo'" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

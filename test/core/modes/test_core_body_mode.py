@@ -188,6 +188,17 @@ def test_a_robot_that_does_not_rise_is_damped() -> None:
     assert machine.state.mode == 'damped' and 'did not rise' in machine.state.reason
 
 
+def test_who_calls_lying_down_off_is_told_that_the_gait_may_go_on() -> None:
+    """As the stop is one that came by itself, a command starts it again: it was said to stay
+    inhibited.
+    """
+    machine = Machine().go(0.1)
+    machine.ask('lie_down')
+    machine.go(0.1, at_rest=False)
+    accepted, told = machine.ask('stand_up')
+    assert accepted and 'goes on at a command' in told
+
+
 def test_lying_down_is_given_up_when_the_gait_never_rests() -> None:
     machine = Machine().go(0.1)
     machine.ask('lie_down')
