@@ -63,6 +63,6 @@ def steps_per_tick(tick_ns: int, step_ns: int) -> int:
     """
     if tick_ns <= 0 or step_ns <= 0 or tick_ns % step_ns:
         raise ParameterError(
-            f'a tick of {tick_ns} ns is not a positive whole multiple of the physics step, '
-            f'{step_ns} ns; control_rate may be {1e9 / step_ns:g} Hz, or a half, a third ...')
+            f'a tick of {tick_ns} ns is not a positive whole multiple of the physics step of '
+            f'{step_ns} ns; control_rate may be {1e9 / step_ns:g} Hz, a half of it, a third ...')
     return tick_ns // step_ns
