@@ -28,19 +28,20 @@ def test_who_misses_ticks_keeps_its_vertical(gait: str, speed: float, tilt: floa
     run.states.clear()
     assert run.walk(6.0)
     for seed in range(3):
-        draw, body, due, off = np.random.default_rng(seed), BodyState(
-            CollectingNode(), run.robot.description), 100, list[float]()
-        for k, state in enumerate(run.states):
-            if k < due <= k + 60 < len(run.states) or k < 50:
-                stamp = state.time_ns
-                found = body.state(stamp, {
-                    'joint_states': (stamp, (
-                        state.joint_position, state.joint_velocity, state.joint_effort)),
-                    'imu': (stamp, (state.measured_rate_in_base, state.acceleration_in_base)),
-                    'foot_contacts': (stamp, state.foot_force)})
-                up, seen = (np.array(vec3.upward(one.base_quaternion.tolist()))
-                            for one in (state, found))
-                off.append(float(np.arccos(min(1.0, up @ seen))))
-            elif k >= due:
-                due = k + int(draw.integers(1, 60))
+        draw, body, off, k, until = np.random.default_rng(seed), BodyState(
+            CollectingNode(), run.robot.description), list[float](), 0, 100
+        while k < len(run.states):
+            state, stamp = run.states[k], run.states[k].time_ns
+            found = body.state(stamp, {
+                'joint_states': (stamp, (
+                    state.joint_position, state.joint_velocity, state.joint_effort)),
+                'imu': (stamp, (state.measured_rate_in_base, state.acceleration_in_base)),
+                'foot_contacts': (stamp, state.foot_force)})
+            up, seen = (np.array(vec3.upward(one.base_quaternion.tolist()))
+                        for one in (state, found))
+            off.append(float(np.arccos(min(1.0, up @ seen))))
+            k += 1
+            if k > until:
+                k += int(draw.integers(12, 70))
+                until = k + int(draw.integers(1, 60))
         assert len(off) > 500 and max(off) < tilt

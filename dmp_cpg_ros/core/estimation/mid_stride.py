@@ -32,8 +32,8 @@ GENTLE = (0.7, 1.3)
 
 CARRIED = 0.3
 """Share of what the accelerometer feels that is the feet's force, from which the body is on its
-feet, and its tilt is not told by one reading: of a trot at 1 m/s one in 300 is as long as in rest
-and off the vertical by 37 to 130 degrees.
+feet, and its tilt is not told by one reading: of a trot at 1 m/s whose nodes died now and then,
+some 50 of 18,000 were as long as in rest and off the vertical by 37 to 130 degrees.
 """
 
 
