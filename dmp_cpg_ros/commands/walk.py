@@ -154,7 +154,9 @@ def _overrides(scenario: Scenario, options: argparse.Namespace, ros: ros_argumen
 
 
 def _check_events(scenario: Scenario, suite: Suite, named: str) -> None:
-    """Raise ParameterError for an event that the suite cannot have."""
+    """Raise DmpCpgError for an event that the suite cannot have."""
+    with naming(named):
+        scenario.timeline(suite.tick_ns)
     for event in scenario.events:
         gait = event.value if event.kind == 'gait' else (
             event.value.get('gait') if event.kind == 'set' else None)

@@ -14,7 +14,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.gait.contact_feedback import initial_contact_state
-from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait.network import SLOWEST, CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import CanonicalState
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.announced import Announced
@@ -209,12 +209,14 @@ class InhibitionNode(SuiteNode):
         return state.time_ns - state.request_ns < max(tick_ns, self._lead_ns - tick_ns)
 
     def _unhurried(self, gait: GaitInForce) -> GaitNetwork:
-        """Oscillators at the cadence that a gait has but for the quickness that acts."""
+        """Oscillators at the cadence that a gait has but for the quickness that acts; at its own
+        where they cannot have heard of that yet.
+        """
         quickness = self._announced.acting.quickness
-        if quickness == 1.0:
+        slow = gait.cadence_scale / quickness
+        if quickness == 1.0 or slow < SLOWEST:
             return self._network
-        return self._network.of(
-            self.certified.gaits.at_cadence(gait, gait.cadence_scale / quickness))
+        return self._network.of(self.certified.gaits.at_cadence(gait, slow))
 
     # Restarts, and what is missing -------------------------------------------------------------
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from ros_processes import Ros
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
 
+from dmp_cpg_ros.core.inhibition.announced import Announced
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.inhibition import InhibitionNode
@@ -157,4 +159,21 @@ def test_no_coupling_changes_from_when_a_stop_is_heard_of_until_its_arming_is(ro
         assert not result.successful and 'while' in result.reason
         told += gait.inhibition._announced.latest.gains.any()
     assert told > 0  # it was armed, and not heard of
+    gait.end()
+
+
+def test_a_stop_is_predicted_of_oscillators_that_have_not_heard_how_quick_they_are_to_be(
+        ros: Ros) -> None:
+    """Such as those that were away when a body that sways asked for quicker steps."""
+    gait = Gait(ros, 8, 0, 1e-9 * TICK_NS * 20)
+    for _ in range(200):
+        gait.tick()
+    inhibition = gait.inhibition
+    pushed = replace(inhibition._announced.latest, quickness=1.6)
+    inhibition._announced = Announced(pushed)
+    inhibition._state = replace(inhibition._state, quickness=1.6)
+    taken, answer = inhibition._take_request(SetBool.Request(data=True))
+    assert taken and 's' in answer
+    gait.tick()
+    assert inhibition._acting_now().cadence == gait.canonical._state.gait.cadence_scale == 1.0
     gait.end()

@@ -39,6 +39,9 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 LONGEST_STEP = 0.005
 """Longest time step of the oscillators [s]."""
 
+SLOWEST = 0.7
+"""Least factor on a gait's cadence."""
+
 AT_REST = 0.05
 """Rates |ẋ| up to which oscillators rest and may be turned [1/s]."""
 
@@ -55,7 +58,7 @@ class CanonicalParameters(Parameters):
         choices=TOPOLOGIES)
     cadence_scale: float = parameter(
         1.0, "factor on the gait's cadence at every speed; slower robots tip over between steps",
-        0.7, 4.0)
+        SLOWEST, 4.0)
     contact_feedback: bool = parameter(
         False, 'whether early and late touchdown shift the phase of the legs')
     contact_gain: float = parameter(

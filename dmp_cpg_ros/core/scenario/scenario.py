@@ -55,6 +55,9 @@ EVENT_KEYS = {
 LASTING_KINDS = ('command', 'votes')
 """Kinds of events that hold until the next of their kind, and are repeated."""
 
+SENT_KINDS = (*LASTING_KINDS, 'push', 'fail')
+"""Kinds of events that may be there before the first tick; for all others a node is asked."""
+
 
 @dataclass(frozen=True)
 class Event:
@@ -287,15 +290,28 @@ class Scenario:
                    {**world_overrides(values.get('world'), where), **parameters})
 
     def timeline(self, tick_ns: int) -> tuple[Action, ...]:
-        """All actions in order, each at the first tick that is not before its time."""
-        actions: list[Action] = []
+        """All actions in order, each at the first tick that is not before its time; what nodes are
+        asked for at 0 s at their second one, for before their first they refuse.
+
+        Raises
+        ------
+        DataError
+            If no tick is left for an event.
+        """
+        actions, end_ns = list[Action](), self.ticks(tick_ns) * tick_ns
         for place, event in enumerate(self.events):
             time_ns, times = round(event.at * 1e9), range(1)
+            if event.kind not in SENT_KINDS:
+                time_ns = max(time_ns, tick_ns)
+            if _tick_after(time_ns, tick_ns) >= end_ns:
+                raise DataError(
+                    f'event {place + 1}, {event.label}: at = {event.at:g} s leaves no tick: '
+                    f'the last is at {(end_ns - tick_ns) * 1e-9:g} s')
             if event.kind in LASTING_KINDS:
                 following = [e.at for e in self.events[place + 1:] if e.kind == event.kind]
-                end_ns = round((following or [self.duration_s])[0] * 1e9)
+                until_ns = round((following or [self.duration_s])[0] * 1e9)
                 ends = event.value is None
-                times = range(0, 1 if ends else max(end_ns - time_ns, 1), COMMAND_PERIOD_NS)
+                times = range(0, 1 if ends else max(until_ns - time_ns, 1), COMMAND_PERIOD_NS)
             actions += [Action(_tick_after(time_ns + later, tick_ns), event.kind, event.value,
                                '' if later else event.label) for later in times]
         return tuple(sorted(actions, key=lambda action: action.time_ns))

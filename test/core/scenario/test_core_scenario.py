@@ -35,6 +35,25 @@ def test_every_event_acts_at_the_first_tick_that_is_not_before_its_time() -> Non
     assert [action.label for action in actions] == ['resume', 'faster', 'gait walk']
 
 
+def test_nodes_are_asked_from_their_second_tick_on_and_told_before_their_first() -> None:
+    """Before its first tick a node refuses what it is asked."""
+    at_once = [{'at': 0.0, kind: value} for kind, value in (
+        ('inhibit', False), ('command', {'v_x': 0.5}), ('set', {'cadence_scale': 1.5}),
+        ('gait', 'trot'), ('stand_up', True))]
+    actions = scenario(*at_once, duration=0.1).timeline(TICK_NS)
+    assert [(action.kind, action.time_ns) for action in actions] == [
+        ('command', 0), ('inhibit', TICK_NS), ('set', TICK_NS), ('gait', TICK_NS),
+        ('stand_up', TICK_NS)]
+
+
+@pytest.mark.parametrize('at', [0.0975, 0.1])
+def test_an_event_for_which_no_tick_is_left_is_refused(at: float) -> None:
+    events = [{'at': 0.096, 'inhibit': False}, {'at': at, 'gait': 'trot'}]
+    assert len(scenario(events[0], duration=0.1).timeline(TICK_NS)) == 1
+    with pytest.raises(DataError, match=r'event 2, gait trot: at = .* the last is at 0.096 s'):
+        scenario(*events, duration=0.1).timeline(TICK_NS)
+
+
 def test_a_command_is_repeated_until_the_next_one_and_silence_is_silent() -> None:
     played = scenario({'at': 0.0, 'command': {'v_x': 0.5}}, {'at': 0.3, 'gait': 'trot'},
                       {'at': 1.0, 'command': 'silence'})
