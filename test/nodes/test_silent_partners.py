@@ -456,17 +456,26 @@ def test_oscillators_and_reference_that_come_back_in_time_go_on_in_phase(
         off > 0.1 and not reference._r.any())
 
 
-def test_a_memory_that_does_not_come_is_waited_for_no_longer_than_for_a_while(ros: Ros) -> None:
+@pytest.mark.parametrize(('gains', 'remembered', 'waited_ns'), [
+    (ACTS, False, RETURN_NS), (Announced(STOPPED), False, gait_memory.PATIENT_NS),
+    (None, False, gait_memory.PATIENT_NS), (None, True, RETURN_NS)])
+def test_what_does_not_come_is_waited_for_longer_where_a_gait_goes_on(
+        ros: Ros, gains: Announced | None, remembered: bool, waited_ns: int) -> None:
     reference, sent = ReferenceFilter(
         'reference_filter', context=ros.context, parameter_overrides=RETURNS), list[Any]()
     ros.nodes.append(reference)
     reference.start()
     reference._publisher.publish = sent.append  # type: ignore[method-assign]
-    for stamp in range(TICK, 10 * gait_memory.PATIENT_NS, TICK):
-        reference.on_tick(stamp, {'joint_states': None, 'inhibition_gains': (stamp, ACTS)})
+    if remembered:
+        _, before, tick = walked(10)
+        reference._memory._kept.append(GaitMemoryWriter(tuple(load_gaits())).fill(
+            before.time_ns, tick.x, tick.x_dot, tick.gait, tick.r))
+    for stamp in range(TICK, 2 * RETURN_NS, TICK):
+        reference.on_tick(stamp, {
+            'joint_states': None, 'inhibition_gains': gains and (stamp, gains)})
         if sent:
             break
-    assert stamp == TICK + gait_memory.PATIENT_NS
+    assert stamp == TICK + waited_ns
 
 
 @pytest.mark.parametrize('comes', [True, False])

@@ -27,6 +27,8 @@ the robot has not moved, which waits; in real time the gait goes on without the 
 PATIENT_NS = 300_000_000
 """In real time: how long a node that may have been restarted waits for the memory, and for the
 gains without which it would be at rest [ns]. They are latched, and may come after the first tick.
+Where one of them says that a gait goes on the other is waited for as long as the others go on
+without the node: of 90 oscillators that came back three had the memory and no gains in that time.
 """
 
 LOCK_STEP_S, LOOK_EVERY_S = 2.0, 0.1
@@ -78,12 +80,14 @@ class GaitMemory:
                 now_s < self._until_s and (not self._kept or not gains or gains[0] < acting_ns))
             self._held = (stamp_ns, values) if waits else None
             return waits
-        if not self._node.return_ns or (
-                self._kept and values.get('inhibition_gains') is not None):
+        gains = values.get('inhibition_gains')
+        if not self._node.return_ns or (self._kept and gains is not None):
             return False
         if self._began_ns < 0:
             self._began_ns = stamp_ns
-        return stamp_ns - self._began_ns < PATIENT_NS
+        goes_on = self._kept or (gains is not None and not gains[1].latest.requested)
+        return stamp_ns - self._began_ns < (
+            max(PATIENT_NS, self._node.return_ns) if goes_on else PATIENT_NS)
 
     def _hear(self, message: Any) -> None:
         self._kept.append(message)
