@@ -24,11 +24,12 @@ FRESH_NS = 20_000_000
 the robot has not moved, which waits; in real time the gait goes on without the node for longer.
 """
 
-PATIENT_NS = 300_000_000
+PATIENT_NS = 500_000_000
 """In real time: how long a node that may have been restarted waits for the memory, and for the
-gains without which it would be at rest [ns]. They are latched, and may come after the first tick.
+gains without which it would be at rest [ns]. They are latched and may come after the first tick,
+for participants announce themselves four times a second; sooner nobody believes another writer.
 Where one of them says that a gait goes on the other is waited for as long as the others go on
-without the node: of 90 oscillators that came back three had the memory and no gains in that time.
+without the node.
 """
 
 LOCK_STEP_S, LOOK_EVERY_S = 2.0, 0.1
