@@ -296,14 +296,14 @@ class Scenario:
         Raises
         ------
         DataError
-            If no tick is left for an event.
+            If no tick is left for an event that does not last; one that does would end at once.
         """
         actions, end_ns = list[Action](), self.ticks(tick_ns) * tick_ns
         for place, event in enumerate(self.events):
             time_ns, times = round(event.at * 1e9), range(1)
             if event.kind not in SENT_KINDS:
                 time_ns = max(time_ns, tick_ns)
-            if _tick_after(time_ns, tick_ns) >= end_ns:
+            if event.kind not in LASTING_KINDS and _tick_after(time_ns, tick_ns) >= end_ns:
                 raise DataError(
                     f'event {place + 1}, {event.label}: at = {event.at:g} s leaves no tick: '
                     f'the last is at {(end_ns - tick_ns) * 1e-9:g} s')
