@@ -28,8 +28,8 @@ PATIENT_NS = 500_000_000
 """In real time: how long a node that may have been restarted waits for the memory, and for the
 gains without which it would be at rest [ns]. They are latched and may come after the first tick,
 for participants announce themselves four times a second; sooner nobody believes another writer.
-Where one of them says that a gait goes on the other is waited for as long as the others go on
-without the node.
+Gains are waited for as long as the others go on without the node where a memory has come, and a
+memory as long where they do not stop the gait.
 """
 
 LOCK_STEP_S, LOOK_EVERY_S = 2.0, 0.1
@@ -87,8 +87,8 @@ class GaitMemory:
         if self._began_ns < 0:
             self._began_ns = stamp_ns
         goes_on = self._kept or (gains is not None and not gains[1].latest.requested)
-        return stamp_ns - self._began_ns < (
-            max(PATIENT_NS, self._node.return_ns) if goes_on else PATIENT_NS)
+        longest_ns = max(PATIENT_NS, self._node.return_ns) if goes_on else PATIENT_NS
+        return stamp_ns - self._began_ns < longest_ns
 
     def _hear(self, message: Any) -> None:
         self._kept.append(message)

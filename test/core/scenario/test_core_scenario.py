@@ -54,6 +54,13 @@ def test_an_event_for_which_no_tick_is_left_is_refused(at: float) -> None:
         scenario(*events, duration=0.1).timeline(TICK_NS)
 
 
+@pytest.mark.parametrize('last', [{'command': 'silence'}, {'command': {'v_x': 0.1}},
+                                  {'votes': {}}])
+def test_what_would_last_for_nothing_is_not_refused(last: Any) -> None:
+    assert scenario({'at': 0.0, 'inhibit': False}, {'at': 0.1, **last},
+                    duration=0.1).timeline(TICK_NS)
+
+
 def test_a_command_is_repeated_until_the_next_one_and_silence_is_silent() -> None:
     played = scenario({'at': 0.0, 'command': {'v_x': 0.5}}, {'at': 0.3, 'gait': 'trot'},
                       {'at': 1.0, 'command': 'silence'})
